@@ -48,7 +48,7 @@ def blocks(scenario: Scenario) -> dict[str, float]:
         start = time.perf_counter()
         recorder.make_room()
         found["recorder_us"] += (time.perf_counter() - start) / _CALLS * 1e6
-        steps = min(recorder.room, _CALLS - recorder.rows)
+        steps = min(recorder.tape.record["room"].item(), _CALLS - recorder.rows)
         found["vehicle_us"] += per_call_us(vehicle.step, steps, command, steer) * steps / _CALLS
     found["recorder_us"] += per_call_us(recorder.flush, 1) / _CALLS
     return found

@@ -22,7 +22,7 @@ def modules_of(arguments: list[str]) -> list[str]:
     """Drive a run and return the modules."""
     from activesteer.commands import cli  # noqa: PLC0415
     from activesteer.commands import drive as command  # noqa: PLC0415
-    from activesteer.simulation import runner  # noqa: PLC0415
+    from activesteer.simulation.simulation import Simulation  # noqa: PLC0415
 
     found: dict[str, None] = {}
     inside = 0
@@ -32,13 +32,13 @@ def modules_of(arguments: list[str]) -> list[str]:
         code, name = frame.f_code, frame.f_globals.get("__name__", "")
         if event == "call" and code is begins:
             inside = 1
-        elif event == "return" and code is ends:
+        elif event == "call" and code is ends:
             inside = 2
         is_function = code.co_flags & inspect.CO_OPTIMIZED  # not the body of a module or a class
         if inside == 1 and event == "call" and is_function and name.startswith(PACKAGE):
             found.setdefault(name)
 
-    begins, ends = command._run.__code__, runner._drive.__code__
+    begins, ends = command._run.__code__, Simulation.recording.__code__
     with tempfile.TemporaryDirectory() as folder:
         sys.setprofile(seen)
         try:

@@ -16,17 +16,11 @@ from activesteer.errors import ManeuverError, ParameterError, nearest_names, sho
 
 
 class Actuator(NamedTuple):
-    """An actuator as faults name it.
+    """An actuator as faults name it."""
 
-    Attributes:
-        members: The engine's actuators that it stands for.
-        unit: Unit of a size, as the suffix of a key.
-        by_ratio: True if its angle is the steering ratio times that of the road wheel; a size is given at the road
-            wheel.
-    """
-
-    members: tuple[str, ...]
-    unit: str = "rad"
+    members: tuple[str, ...]  # the engine's actuators that it stands for
+    unit: str = "rad"  # unit of a size, as the suffix of a key
+    # true if its angle is the steering ratio times that of the road wheel; a size is given at the road wheel
     by_ratio: bool = False
 
     @property
@@ -121,7 +115,8 @@ class Fault:
             raise ManeuverError(
                 "a sensor cannot move freely; use dropout for a broken wire", key="kind", value=self.kind
             )
-        if (self.kind == "float" and self._has_torque) or (self.kind == "reversed" and self._is_brake):
+        is_brake = self._has_torque and not self.part.startswith(MOTOR)
+        if (self.kind == "float" and self._has_torque) or (self.kind == "reversed" and is_brake):
             problem = "a brake cannot float or be reversed, and a motor cannot float; use dropout to leave it open"
             raise ManeuverError(problem, key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
@@ -155,10 +150,6 @@ class Fault:
     @property
     def _has_torque(self) -> bool:
         return self.part in ACTUATORS and ACTUATORS[self.part].has_torque
-
-    @property
-    def _is_brake(self) -> bool:
-        return self._has_torque and not self.part.startswith(MOTOR)
 
     @property
     def size(self) -> float:

@@ -54,27 +54,20 @@ def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) ->
             yield target
             return
         part = target.with_name(f".{target.stem[:40]}-{secrets.token_hex(4)}.part{target.suffix}")
-        with temporary_file(part):
+        _passing.add(part)
+        try:
             yield part
             if target.exists():
                 part.chmod(target.stat().st_mode & 0o777)
             part.replace(target)
-
-
-@contextmanager
-def temporary_file(part: Path) -> Iterator[None]:
-    """Context around the writing of a temporary file, which deletes the file if it still exists at the end."""
-    _passing.add(part)
-    try:
-        yield
-    finally:
-        with suppress(OSError):  # where it cannot be deleted, the error of the writing itself says why
-            part.unlink(missing_ok=True)
-        _passing.discard(part)
+        finally:
+            with suppress(OSError):  # where it cannot be deleted, the error of the writing itself says why
+                part.unlink(missing_ok=True)
+            _passing.discard(part)
 
 
 def delete_temporary_files() -> None:
-    """Delete all temporary files of `temporary_file`, before the process ends without unwinding."""
+    """Delete all temporary files of `atomic_write`, before the process ends without unwinding."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -180,15 +173,10 @@ def read_text(
 
 
 class CsvRow(NamedTuple):
-    """Row of a CSV.
+    """Row of a CSV."""
 
-    Attributes:
-        line: Line in the file, from 1.
-        cells: Cells without surrounding blanks.
-    """
-
-    line: int
-    cells: list[str]
+    line: int  # line in the file, from 1
+    cells: list[str]  # cells without surrounding blanks
 
 
 def read_csv(
@@ -214,16 +202,6 @@ def read_csv(
     except csv.Error as reason:
         raise error(f"no valid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason
     return rows
-
-
-def csv_number(cell: str, error: type[ActiveSteerError], file: str, line: int, column: str) -> float:
-    """Return the number in a cell of a CSV."""
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    limits.check_number(value, error, text=cell, file=file, line=line, key=column)
-    return value
 
 
 def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Path:

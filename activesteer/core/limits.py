@@ -110,6 +110,16 @@ def check_number(value: float, error: type[ActiveSteerError], *, text: Any = Non
         )  # fmt: skip
 
 
+def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
+    """Return the number in a text (see `check_number`)."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    check_number(value, error, text=text, **place)
+    return value
+
+
 def too_large(values: Any, *, infinite: bool = False) -> Any:
     """Return which values are above `MAX_NUMBER`, or above it but finite if `infinite`."""
     size = abs(values)

@@ -61,23 +61,15 @@ class Form(StrEnum):
 
 
 class Metric(NamedTuple):
-    """A declared metric.
+    """A declared metric."""
 
-    Attributes:
-        name: Its name in recordings, which ends in its SI unit.
-        label: Its name in words.
-        unit: Its unit for display, with the factor from the SI value.
-        significance: Smallest difference that a driver or a sensor in a test car could tell [SI]; 0 if unknown.
-        better: Its preferred direction; None where neither more nor less is better.
-        form: How its value is written.
-    """
-
-    name: str
-    label: str
-    unit: DisplayUnit
+    name: str  # its name in recordings, which ends in its SI unit
+    label: str  # its name in words
+    unit: DisplayUnit  # its unit for display, with the factor from the SI value
+    # smallest difference that a driver or a sensor in a test car could tell [SI]; 0 if unknown
     significance: float = 0.0
-    better: Better | None = None
-    form: Form = Form.NUMBER
+    better: Better | None = None  # its preferred direction; None where neither more nor less is better
+    form: Form = Form.NUMBER  # how its value is written
 
     @property
     def unit_name(self) -> str:

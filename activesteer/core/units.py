@@ -17,19 +17,12 @@ _DEG, _G, _TURN = math.radians(1.0), GRAVITY_MPS2, 2.0 * math.pi
 
 
 class Unit(NamedTuple):
-    """A unit: value in SI = factor times value + offset.
-
-    Attributes:
-        name: Its name.
-        factor: Factor to SI.
-        dimension: Exponents of kg, m, s and rad.
-        offset: Offset in SI, which an FMU may declare.
-    """
+    """A unit: value in SI = factor times value + offset."""
 
     name: str
-    factor: float
-    dimension: tuple[int, int, int, int]
-    offset: float = 0.0
+    factor: float  # factor to SI
+    dimension: tuple[int, int, int, int]  # exponents of kg, m, s and rad
+    offset: float = 0.0  # offset in SI, which an FMU may declare
 
 
 class DisplayUnit(NamedTuple):
@@ -157,23 +150,14 @@ def display_unit(name: str) -> DisplayUnit:
 
 
 class Quantity(NamedTuple):
-    """Display of a recorded signal.
-
-    Attributes:
-        channel: Name of the channel.
-        label: Label of the signal.
-        short: Short label.
-        unit: Display unit.
-        digits: Digits after the decimal point.
-        min_span: Smallest height of an axis in the display unit, which keeps a nearly constant signal flat.
-    """
+    """Display of a recorded signal."""
 
     channel: str
     label: str
     short: str
     unit: DisplayUnit
-    digits: int
-    min_span: float
+    digits: int  # digits after the decimal point
+    min_span: float  # smallest height of an axis in the display unit, which keeps a nearly constant signal flat
 
     @property
     def factor(self) -> float:

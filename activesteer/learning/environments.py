@@ -82,7 +82,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Start an episode at the start of the manoeuvre (see `gymnasium.Env.reset`)."""
         super().reset(seed=seed)
         (observation,) = self.episodes.reset([0], [self.np_random])
-        self._close_picture()
+        self.close()
         self._given = []
         if self.render_mode == "human":
             self.render()
@@ -126,14 +126,11 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 simulation.advance(steps, None if driver is None else _first(driver), _first(controller))
         return simulation.recording()
 
-    def _close_picture(self) -> None:
+    def close(self) -> None:
+        """Close window and canvas."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None
-
-    def close(self) -> None:
-        """Close window and canvas."""
-        self._close_picture()
 
 
 def _first(command: Any) -> Any:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 from activesteer.config import Range, Source, build, field_in_unit, find_file
 from activesteer.config.faults import Fault, check_faults
 from activesteer.core import limits
-from activesteer.core.files import csv_number, is_file, read_bytes, read_csv
+from activesteer.core.files import is_file, read_bytes, read_csv
 from activesteer.core.signals import Setpoint, new_message
 from activesteer.errors import ManeuverError, nearest_names, shown
 from activesteer.road.course import Course
@@ -33,19 +33,12 @@ KINDS: Final[dict[str, type[Maneuver]]] = {}
 
 
 class NamedFile(NamedTuple):
-    """A key of a manoeuvre that names a file, and the keys next to it that the file fills.
+    """A key of a manoeuvre that names a file, and the keys next to it that the file fills."""
 
-    Attributes:
-        key: The key, as the path of names to it.
-        fills: Keys that it fills, in the same table.
-        read: Function from the file to the values of these keys.
-        folder: Folder of the file among those that are kept with a recording; empty if the values are the whole file.
-    """
-
-    key: tuple[str, ...]
-    fills: tuple[str, ...]
-    read: Callable[[Path], dict[str, Any]]
-    folder: str
+    key: tuple[str, ...]  # the key, as the path of names to it
+    fills: tuple[str, ...]  # keys that it fills, in the same table
+    read: Callable[[Path], dict[str, Any]]  # function from the file to the values of these keys
+    folder: str  # folder of the file among those that are kept with a recording; empty if the values are the whole file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,14 +199,12 @@ def read_columns(
                 key=name,
                 allowed=(*required, *optional),
             )
-    columns: dict[str, list[float]] = {
-        name: [
-            csv_number(row.cells[place] if place < len(row.cells) else "", ManeuverError, path.name, row.line, given)
-            * factor
-            for row in rows
-        ]
-        for name, (place, given, factor) in places.items()
-    }
+    columns: dict[str, list[float]] = {name: [] for name in places}
+    for name, (place, given, factor) in places.items():
+        for row in rows:
+            cell = row.cells[place] if place < len(row.cells) else ""
+            number = limits.number_in(cell, ManeuverError, file=path.name, line=row.line, key=given)
+            columns[name].append(number * factor)
     return columns, [row.line for row in rows]
 
 
@@ -255,22 +246,10 @@ _ROAD_FILES: Final = (
 def with_files(
     kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Fill the values of the files that a manoeuvre names into its table.
+    """Return a table with the values of the files that it names, and the CSV files, to be kept with the recording.
 
-    A table without a file may have both the name of a file and values. It comes from a recording, and the values are
-    those that were read then, unless an override names another file.
-
-    Args:
-        kind: Class of the manoeuvre.
-        table: The table.
-        folder: Folder of the manoeuvre file; None for a table that has no file.
-        source: For error messages.
-
-    Returns:
-        The table, and the CSV files by their names, to be kept with the recording.
-
-    Raises:
-        ManeuverError: a file is not found or wrong, or a manoeuvre file gives the values too.
+    A table without a file has no `folder`, and may have both the name of a file and values. It comes from a recording,
+    and the values are those that were read then, unless an override names another file.
     """
     filled, files = dict(table), {}
     for key, fills, read, kept in (*kind.FILES, *_ROAD_FILES):

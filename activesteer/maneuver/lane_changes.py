@@ -98,28 +98,19 @@ def known_width(vehicle_width_m: float | None) -> float:
     return vehicle_width_m
 
 
-LaneStandard = Literal["iso_3888_1", "iso_3888_2"]
 _CONE_SPACING_M: Final = 5.0
 """Largest distance between cones along a lane [m]."""
 
 
-def lanes(
-    standard: LaneStandard,
-    vehicle_width_m: float,
-    start_x_m: float,
-    side: float,
-    length_factor: float = 1.0,
-    offset_factor: float = 1.0,
-) -> tuple[Lane, ...]:
+def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane, ...]:
     """Return entry, side and exit lane.
 
-    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left, -1 on the right. The offset
-    of side lane and exit lane has a factor of its own.
+    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left, -1 on the right.
     """
     b = vehicle_width_m
     entry = 1.1 * b + 0.25
     # Name, start, length, width, and offset of the centre line [m].
-    if standard == "iso_3888_1":
+    if layout.standard == "iso_3888_1":
         sections = (
             ("entry lane", 0.0, 15.0, entry, 0.0),
             ("side lane", 45.0, 25.0, 1.2 * b + 0.25, 3.5),
@@ -134,9 +125,9 @@ def lanes(
         )
     found = []
     for name, start_m, length_m, width_m, offset_m in sections:
-        start = start_x_m + length_factor * start_m
-        centre, half = side * offset_factor * offset_m, 0.5 * width_m
-        found.append(Lane(name, start, start + length_factor * length_m, centre - half, centre + half))
+        start = layout.entry_m + layout.length_factor * start_m
+        centre, half = side * layout.offset_factor * offset_m, 0.5 * width_m
+        found.append(Lane(name, start, start + layout.length_factor * length_m, centre - half, centre + half))
     return tuple(found)
 
 
@@ -163,19 +154,12 @@ _INCOMPATIBLE: Final = 1e-9
 
 
 class Bound(NamedTuple):
-    """Bounds on y of a point that moves with the car.
+    """Bounds on y of a point that moves with the car."""
 
-    Attributes:
-        x_m: Position of the car's centre [m].
-        ahead_m: Distance of the point ahead of the centre, along the path [m].
-        low_m: Least y of the point [m].
-        high_m: Largest y of the point [m].
-    """
-
-    x_m: float
-    ahead_m: float
-    low_m: float
-    high_m: float
+    x_m: float  # position of the car's centre [m]
+    ahead_m: float  # distance of the point ahead of the centre, along the path [m]
+    low_m: float  # least y of the point [m]
+    high_m: float  # largest y of the point [m]
 
 
 def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequence[Bound]) -> BSpline:
@@ -255,7 +239,7 @@ class LaneLayout:
 
     OVERRULED: ClassVar = {"margin_m": {"path": "middle"}}
 
-    standard: LaneStandard = "iso_3888_1"
+    standard: Literal["iso_3888_1", "iso_3888_2"] = "iso_3888_1"
     """Standard of the lanes: `iso_3888_1` (double lane change) or `iso_3888_2` (obstacle avoidance)."""
     side: Side = "left"
     """Side of the first lane change: `left` or `right`."""
@@ -302,19 +286,15 @@ class LaneChange(AlongCourse, kind="lane_change"):
         """Path, lanes and cones of the standard."""
         layout, width = self.lane, known_width(self.vehicle_width_m)
         # Laid out to the left and then mirrored, so that left and right agree to the last digit.
-        left = self._lanes(width, 1.0)
+        left = lanes(layout, width, 1.0)
         if layout.path == "middle":
             path_x, path_y = _middle(left)
         else:
             self._check_margin(left, width)
             path_x, path_y = _least_jerk_path(left, 0.5 * width + layout.margin_m)
         side = SIGNS[layout.side]
-        course = self._lanes(width, side)
+        course = lanes(layout, width, side)
         return Course(Path.through(path_x, side * path_y), course, cones(course), course[-1].end_x_m)
-
-    def _lanes(self, width: float, side: float) -> tuple[Lane, ...]:
-        layout = self.lane
-        return lanes(layout.standard, width, layout.entry_m, side, layout.length_factor, layout.offset_factor)
 
     def _check_margin(self, course: Sequence[Lane], width: float) -> None:
         narrowest = min(course, key=lambda lane: lane.left_y_m - lane.right_y_m)

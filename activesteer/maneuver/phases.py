@@ -26,23 +26,14 @@ _SENSES: Final = ("above", "below", "within")
 
 
 class Seen(NamedTuple):
-    """State of the car that ends a phase.
+    """State of the car that ends a phase."""
 
-    Attributes:
-        yaw_rate_radps: Yaw rate, left positive [rad/s].
-        roll_rate_radps: Roll rate, positive when the left side rises [rad/s].
-        ay_mps2: Lateral acceleration, left positive [m/s2].
-        speed_mps: Speed along the heading [m/s].
-        x_m: World x of the centre of gravity [m].
-        y_m: World y, left positive [m].
-    """
-
-    yaw_rate_radps: float
-    roll_rate_radps: float
-    ay_mps2: float
-    speed_mps: float
-    x_m: float
-    y_m: float
+    yaw_rate_radps: float  # left positive
+    roll_rate_radps: float  # positive when the left side rises
+    ay_mps2: float  # left positive
+    speed_mps: float  # along the heading
+    x_m: float  # of the centre of gravity, in the world
+    y_m: float  # left positive
 
 
 @dataclass(frozen=True)
@@ -258,9 +249,7 @@ class PhaseSequence:
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
         """Return the setpoint for the driver, after the step to the next phase if this one has ended.
 
-        Args:
-            time_s: Time since the start of the recording [s].
-            seen: State of the car, in the order of `Seen`.
+        It is the setpoint at a time [s] and a state of the car, in the order of `Seen`.
         """
         self.moved = False
         maneuver, until, elapsed_s = self.maneuver, self._phase.until, time_s - self._begin_s

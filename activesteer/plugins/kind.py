@@ -32,35 +32,21 @@ _OURS: Final = "activesteer."
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of block that users can replace by their own.
+    """A kind of block that users can replace by their own."""
 
-    Attributes:
-        word: Name of the kind, such as `controller`.
-        table: Table of the keys of its parameters, such as `controllers`.
-        example: Form of a block in a file, such as `my_file.py:MyController`.
-        inputs: Arguments of the method `step`, as text.
-        built_in: Name -> class of the blocks in the package.
-        result: Message that `step` returns.
-        ranges: Field of the result -> its range.
-        error: Error class of this kind.
-        unchecked: Fields of the result that are not plain numbers.
-        data: Function that returns the names of the blocks that are data files of the package.
-        reserved: Keys of the table that no block of a user may have as its name.
-        filled: Fields of the result that `completed` fills in.
-    """
-
-    word: str
-    table: str
-    example: str
-    inputs: str
-    built_in: Mapping[str, Any]
-    result: type[Any]
-    ranges: Mapping[str, Range]
-    error: type[ActiveSteerError]
-    unchecked: tuple[str, ...] = ()
+    word: str  # name of the kind, such as `controller`
+    table: str  # table of the keys of its parameters, such as `controllers`
+    example: str  # form of a block in a file, such as `my_file.py:MyController`
+    inputs: str  # arguments of the method `step`, as text
+    built_in: Mapping[str, Any]  # name -> class of the blocks in the package
+    result: type[Any]  # message that `step` returns
+    ranges: Mapping[str, Range]  # field of the result -> its range
+    error: type[ActiveSteerError]  # error class of this kind
+    unchecked: tuple[str, ...] = ()  # fields of the result that are not plain numbers
+    # function that returns the names of the blocks that are data files of the package
     data: Callable[[], list[str]] = list
-    reserved: tuple[str, ...] = ()
-    filled: tuple[str, ...] = ()
+    reserved: tuple[str, ...] = ()  # keys of the table that no block of a user may have as its name
+    filled: tuple[str, ...] = ()  # fields of the result that `completed` fills in
     _places: tuple[tuple[int, float, float], ...] = field(init=False)
     _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 

@@ -30,19 +30,12 @@ _EMPTY: Final = inspect.Parameter.empty
 
 
 class Declared(NamedTuple):
-    """A declared parameter.
+    """A declared parameter."""
 
-    Attributes:
-        default: Default value; None if there is none.
-        unit: Unit of the value; empty for a pure number.
-        limits: Range of a number.
-        hint: Type, as for a field of `activesteer.config`; `Any` if the declaration does not tell it.
-    """
-
-    default: Any = None
-    unit: str = ""
-    limits: Range = Range()
-    hint: Any = Any
+    default: Any = None  # None if there is none
+    unit: str = ""  # unit of the value; empty for a pure number
+    limits: Range = Range()  # range of a number
+    hint: Any = Any  # type, as for a field of `activesteer.config`; `Any` if the declaration does not tell it
 
 
 def declared_by(origin: Any) -> dict[str, Declared]:

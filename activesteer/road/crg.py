@@ -131,18 +131,8 @@ def _values(lines: list[str]) -> dict[str, float]:
     for line in lines:
         key, sign, text = (part.strip() for part in line.partition("="))
         if sign:
-            values[key.lower()] = _number(re.sub(r"\+e", "e+", text), key)
+            values[key.lower()] = limits.number_in(re.sub(r"\+e", "e+", text), ManeuverError, key=key)
     return values
-
-
-def _number(text: str, key: str) -> float:
-    """Return the number in a text."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    limits.check_number(value, ManeuverError, text=text, key=key)
-    return value
 
 
 def _road(head: dict[str, float], mods: dict[str, float], definition: list[str], content: bytes) -> CrgRoad:
@@ -238,7 +228,8 @@ def _data(data: bytes, form: str, columns: int) -> Array:
 def _places(head: dict[str, float], names: list[str]) -> Array:
     """Return the distances of the long sections to the left of the line [m]."""
     if all("v =" in name for name in names):
-        return np.array([_number(name.partition("v =")[2].strip(), "v of a long section") for name in names])
+        texts = [name.partition("v =")[2].strip() for name in names]
+        return np.array([limits.number_in(text, ManeuverError, key="v of a long section") for text in texts])
     count = len(names)
     right, left = head.get("long_section_v_right"), head.get("long_section_v_left")
     if right is not None and left is not None:

@@ -204,11 +204,6 @@ class Roughness:
         if not max(self.least_1pm, 1.0 / self.length_m) < self.greatest_1pm:
             raise ManeuverError(f"is {self.greatest_1pm:g}, not above least_1pm and 1/length_m", key="greatest_1pm")
 
-    @property
-    def level_m3(self) -> float:
-        """Displacement spectrum at `REFERENCE_1PM` [m3]."""
-        return CLASSES[self.class_] if self.spectrum_m3 is None else self.spectrum_m3
-
     def grid(self) -> Grid:
         """Return the surface."""
         return _grid(self)
@@ -223,9 +218,10 @@ def _grid(it: Roughness) -> Grid:
     inside = np.flatnonzero((frequency >= it.least_1pm) & (frequency <= it.greatest_1pm))
     random = np.random.default_rng(it.seed)
     lines = np.zeros((columns, count // 2 + 1), np.complex128)
+    level_m3 = CLASSES[it.class_] if it.spectrum_m3 is None else it.spectrum_m3
     for part in np.array_split(inside, math.ceil(inside.size / _CHUNK)):
         n = frequency[part]
-        level = np.sqrt(it.level_m3 * (n / REFERENCE_1PM) ** -2.0 / (count * STEP_M))
+        level = np.sqrt(level_m3 * (n / REFERENCE_1PM) ** -2.0 / (count * STEP_M))
         normal = random.standard_normal((part.size, columns, 2)) @ np.array([1.0, 1j])
         factor = np.linalg.cholesky(_coherence(n, across * np.arange(columns, dtype=np.float64)))
         lines[:, part] = (level[:, None] * np.einsum("fij,fj->fi", factor, normal)).T

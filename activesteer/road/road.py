@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, ClassVar, Final, Literal, NamedTuple
 
 import numpy as np
@@ -240,10 +240,6 @@ class Road:
         grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
         return summed(*grids) if len(grids) > 1 else grids[0] if grids else None
 
-    def cross_slopes(self) -> tuple[float, float, Array] | None:
-        """Return first distance, step [m] and cross slopes of `banking`, or None without it."""
-        return None if self.banking is None else self.banking.sampled()
-
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
         """Return world x and y of places along and to the left of the middle of the road [m]."""
         return s_m, d_m
@@ -297,13 +293,12 @@ def _slope(patch: RoadPatch) -> float:
 class LaidRoad(Road):
     """A road that follows a path."""
 
-    path: Path | None = None
+    path: Path = field(kw_only=True)
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
         """Return world x and y of places along and next to the path, straight beyond its end (see the base class)."""
         path = self.path
-        assert path is not None
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
         beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
         cos, sin = np.cos(heading), np.sin(heading)
@@ -314,7 +309,6 @@ class LaidRoad(Road):
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path
-        assert path is not None
         _, near = KDTree(np.column_stack([path.x_m, path.y_m])).query(np.column_stack([x_m, y_m]))
         dx, dy, heading = x_m - path.x_m[near], y_m - path.y_m[near], path.heading_rad[near]
         cos, sin = np.cos(heading), np.sin(heading)
@@ -323,7 +317,6 @@ class LaidRoad(Road):
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
         """Return quadrangles along the path, whatever the rectangle (see the base class)."""
         path, found = self.path, []
-        assert path is not None
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
             if shown is not None:

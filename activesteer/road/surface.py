@@ -252,7 +252,7 @@ def surface_of(road: Road) -> Surface:
     """Return the surface of an uneven road."""
     head = np.zeros(1, SURFACE)
     head["coarse_m"] = COARSE_M
-    grid, slopes = road.grid(), road.cross_slopes()
+    grid = road.grid()
     numbers = []
     if grid is not None:
         rows, columns = grid.z_m.shape
@@ -262,8 +262,8 @@ def surface_of(road: Road) -> Surface:
         head["rise_per_s"], head["rises"] = head["grid_per_s"] / per, -(-rows // per)
         head["coarse_m"] = min(max(0.7 * grid.step_s_m, COARSE_M), 2.0 * COARSE_M)
         numbers.append(grid.z_m.ravel())
-    if slopes is not None:
-        start, step, values = slopes
+    if road.banking is not None:
+        start, step, values = road.banking.sampled()
         head["slope_s_m"], head["slope_per_s"], head["slopes"] = start, 1.0 / step, len(values)
         numbers.append(values)
     if grid is not None:

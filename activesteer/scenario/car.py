@@ -222,20 +222,13 @@ class VehicleConfig(VehicleParameters):
 
 @dataclass(frozen=True)
 class CarSpec:
-    """A car, ready to be put on a road.
+    """A car, ready to be put on a road."""
 
-    Attributes:
-        config: The vehicle file.
-        mjcf: The model file.
-        tyres: Tyres of the front and of the rear axle.
-        new_tyres: The tyres without the factors of the vehicle file.
-        files: Name -> content of all its files, to be kept with a recording.
-    """
-
-    config: VehicleConfig
-    mjcf: Path
-    tyres: tuple[TyreParameters, TyreParameters]
-    new_tyres: tuple[TyreParameters, TyreParameters]
+    config: VehicleConfig  # the vehicle file
+    mjcf: Path  # the model file
+    tyres: tuple[TyreParameters, TyreParameters]  # tyres of the front and of the rear axle
+    new_tyres: tuple[TyreParameters, TyreParameters]  # the tyres without the factors of the vehicle file
+    # name -> content of all its files, to be kept with a recording
     files: dict[str, bytes] = field(default_factory=dict)
 
     @property
@@ -312,18 +305,13 @@ def read_table(
 
 @dataclass(frozen=True)
 class ChosenDriver:
-    """The driver of a scenario.
-
-    Attributes:
-        plugin: Plugin that creates the driver.
-        parameters: The driver file; for a user's code the file of the default driver, which the code can read.
-        files: Name -> content of all files, to be kept with a recording.
-        user_parameters: Overrides of the parameters of a user's code: class -> name -> value.
-    """
+    """The driver of a scenario."""
 
     plugin: Plugin
+    # the driver file; for a user's code the file of the default driver, which the code can read
     parameters: DriverParameters
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes]  # name -> content of all files, to be kept with a recording
+    # overrides of the parameters of a user's code: class -> name -> value
     user_parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def to_table(self) -> dict[str, Any]:

@@ -27,21 +27,13 @@ _BEYOND_M: Final = 30.0
 
 
 class RunContext(NamedTuple):
-    """Contents of a recording apart from its rows.
+    """Contents of a recording apart from its rows."""
 
-    Attributes:
-        channels: The table of channels.
-        body_names: Bodies whose poses are recorded.
-        metadata: Resolved parameters, versions.
-        files: Manoeuvre, vehicle, model and tyre files, and the code of a user's controller and driver.
-        scene: Appearance of the car.
-    """
-
-    channels: tuple[Channel, ...]
-    body_names: tuple[str, ...]
-    metadata: dict[str, Any]
-    files: dict[str, bytes]
-    scene: tuple[ScenePart, ...]
+    channels: tuple[Channel, ...]  # the table of channels
+    body_names: tuple[str, ...]  # bodies whose poses are recorded
+    metadata: dict[str, Any]  # resolved parameters, versions
+    files: dict[str, bytes]  # manoeuvre, vehicle, model and tyre files, and the code of a user's controller and driver
+    scene: tuple[ScenePart, ...]  # appearance of the car
 
     @classmethod
     def of(cls, scenario: Scenario, vehicle: Vehicle, controller: Plugin) -> RunContext:

@@ -146,7 +146,10 @@ def resolve(
         >>> scenario.maneuver.course.path.length_m > 100.0
         True
     """
-    given = recorded_inputs(maneuver) if is_recording(maneuver) else maneuver
+    given = maneuver
+    if is_recording(maneuver):
+        file = user_path(maneuver, RecordingError)
+        given = open_loop_of(Recording.open(file, recover=True), file.stem)  # of a damaged file up to the damage
     table, source, folder, files = read_table(given, "maneuver", find_maneuver, ManeuverError)
     kind = maneuver_class(table, source)
     if folder is not None:
@@ -381,12 +384,6 @@ _ON_GROUND: Final = 0.5
 def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
     """Return whether a manoeuvre is given as a recording, whose inputs are driven again."""
     return isinstance(maneuver, (str, os.PathLike)) and os.fspath(maneuver).endswith(".mcap")
-
-
-def recorded_inputs(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manoeuvre of a recording, up to a damage (see `open_loop_of`)."""
-    file = user_path(path, RecordingError)
-    return open_loop_of(Recording.open(file, recover=True), file.stem)
 
 
 def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:

@@ -29,27 +29,25 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
     """
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()
-    header = next((number for number, line in enumerate(lines) if _is_header(line, table)), None)
-    if header is None:
+    start = source.line_of([table])
+    if start is None or not isinstance(before[table], Mapping):
         lines += ["", f"[{table}]"]
-        header, before = len(lines) - 1, {**before, table: {}}
-    end = next((number for number in range(header + 1, len(lines)) if _is_header(lines[number])), len(lines))
-    # Blank lines and comments above the next header belong to the next table.
-    while end > header + 1 and not re.match(r"\s*[\w\"'-]+\s*=", lines[end - 1]):
-        end -= 1
+        start, before = len(lines), {**before, table: {}}
+    # Blank lines and comments below the last key belong to the next table.
+    ends = (source.line_of([table, key]) for key, value in before[table].items() if not isinstance(value, Mapping))
+    end = max([start, *filter(None, ends)])
     body, missing = [f"{_NOTE}{command}` on {date}."], dict(values)
-    for line in lines[header + 1 : end]:
+    for line in lines[start:end]:
         if line.startswith(_NOTE):
             continue
         pair = re.match(r"(?P<key>\s*[\w-]+\s*=\s*)(?P<value>[^#\s]+)(?P<rest>.*)$", line)
         key = pair["key"].split("=")[0].strip() if pair else ""
         if pair and (new := missing.pop(_SAME.get(key, key), None)) is not None:
-            start = pair["key"].replace(key, _SAME.get(key, key))
-            body.append(f"{start}{new}{pair['rest']}")
+            body.append(f"{pair['key'].replace(key, _SAME.get(key, key))}{new}{pair['rest']}")
         else:
             body.append(line)
     body += [f"{key} = {value}" for key, value in missing.items()]
-    written = "\n".join([*lines[: header + 1], *body, *lines[end:]]) + "\n"
+    written = "\n".join([*lines[:start], *body, *lines[end:]]) + "\n"
     try:
         after = tomllib.loads(written)
     except tomllib.TOMLDecodeError:
@@ -62,8 +60,3 @@ def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], comm
             key=f"[{table}]",
         )
     write_text(vehicle_file, written, ParameterError)
-
-
-def _is_header(line: str, name: str | None = None) -> bool:
-    match = re.fullmatch(r"\s*\[+\s*([^\[\]]+?)\s*\]+\s*(#.*)?", line)
-    return match is not None and (name is None or match[1] == name)

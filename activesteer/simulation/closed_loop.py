@@ -167,7 +167,8 @@ class ClosedLoop(Uncopyable):
         self.drive(0 if settled else steps)
         self.settling = None
         self._store()
-        arrived = self._arrived if settled is None else _arrived(settled.bus, settled.numbers["calls"])
+        bus, calls = (self._bus, self._record["calls"]) if settled is None else (settled.bus, settled.numbers["calls"])
+        arrived = _arrived(bus, calls)
         if arrived[-1]:
             vehicle.record_estimate(Estimate(*arrived[N_COMMAND:-1].tolist()))
         vehicle.rebase()
@@ -270,14 +271,10 @@ class ClosedLoop(Uncopyable):
     def commands(self) -> tuple[DriverCommand, ActuatorCommand]:
         """Last commands of driver and controller."""
         command = message_of(ActuatorCommand, self._record["actuator_command"][0].tolist())
-        arrived = self._arrived
+        arrived = _arrived(self._bus, self._record["calls"])
         if arrived[-1] and not self._record["controller_given"][0]:
             command = command._replace(estimate=Estimate(*arrived[N_COMMAND:-1].tolist()))
         return self._driver_command(self._driver_numbers.item(0)), command
-
-    @property
-    def _arrived(self) -> Array:
-        return _arrived(self._bus, self._record["calls"])
 
     @property
     def step_count(self) -> int:
@@ -568,9 +565,6 @@ class ClosedLoop(Uncopyable):
             self._held[-1] = 0.0
         self._stage[0] = native.PASS_ON
 
-    def _check(self) -> None:
-        self.vehicle.check()
-
 
 _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
     native.NEEDS_BLOCKS: ClosedLoop._load,
@@ -580,7 +574,7 @@ _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
     native.NEEDS_GAINS: ClosedLoop._prepare,
     native.NEEDS_DRIVER: ClosedLoop._ask_driver,
     native.NEEDS_CONTROLLER: ClosedLoop._ask_controller,
-    native.INSANE: ClosedLoop._check,
+    native.INSANE: lambda loop: loop.vehicle.check(),
 }
 
 

@@ -9,8 +9,8 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from typing import Any, Final, NamedTuple, Protocol
+from contextlib import contextmanager
+from typing import Any, Final
 
 from activesteer.core.conventions import run_looks
 from activesteer.core.units import quantity_of
@@ -37,32 +37,11 @@ _TURN_S: Final = 0.4
 """Time constant of the camera's direction behind the car's direction of motion [s]."""
 
 
-class Viewer(Protocol):
-    """Part of the interface of MuJoCo's passive viewer."""
-
-    cam: Any
-
-    def is_running(self) -> bool:
-        """Return whether the window is still open."""
-        ...
-
-    def lock(self) -> AbstractContextManager[Any]:
-        """Return the lock to hold while the scene changes."""
-        ...
-
-    def sync(self) -> None:
-        """Show the current scene."""
-        ...
-
-    def set_texts(self, texts: Any) -> None:
-        """Show text over the frame: font, place, left column, right column, each `None` for the default."""
-        ...
-
-
 class FramePacer:
     """Keeper of simulated time to the time of a clock.
 
     Attributes:
+        speed: Simulated seconds per second of the clock.
         lost_s: Delay of the drive behind the clock so far [s of the clock].
     """
 
@@ -73,18 +52,13 @@ class FramePacer:
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
         """Take a clock, which starts with the first picture."""
-        self._speed, self._clock, self._sleep = speed, clock, sleep
+        self.speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
 
-    @property
-    def speed(self) -> float:
-        """Simulated seconds per second of the clock, which may change from the next frame on."""
-        return self._speed
-
-    @speed.setter
-    def speed(self, speed: float) -> None:
-        self._speed, self._start_s = speed, None
+    def change_speed(self, factor: float) -> None:
+        """Change the speed by a factor, from the next picture on."""
+        self.speed, self._start_s = min(max(self.speed * factor, _SLOWEST), _FASTEST), None
 
     def wait(self) -> None:
         """Wait for the time of one picture without simulated time."""
@@ -95,8 +69,8 @@ class FramePacer:
         """Wait until the next picture is due."""
         now_s = self._clock()
         if self._start_s is None:
-            self._start_s = now_s - shown_s / self._speed
-        passed_s = now_s - self._start_s - shown_s / self._speed
+            self._start_s = now_s - shown_s / self.speed
+        passed_s = now_s - self._start_s - shown_s / self.speed
         if passed_s < FRAME_S:
             self._sleep(FRAME_S - passed_s)
             passed_s = FRAME_S
@@ -104,7 +78,7 @@ class FramePacer:
             self._start_s += passed_s - _MAX_S
             self.lost_s += passed_s - _MAX_S
             passed_s = _MAX_S
-        return shown_s + passed_s * self._speed
+        return shown_s + passed_s * self.speed
 
 
 class Keys:
@@ -133,20 +107,6 @@ class Keys:
             self.faster *= 2.0
 
 
-class DriveResult(NamedTuple):
-    """Result of a drive in a window.
-
-    Attributes:
-        simulated_s: Simulated time [s].
-        pictures: Number of pictures shown.
-        finished: Whether the drive finished before the window was closed or the drive was restarted.
-    """
-
-    simulated_s: float
-    pictures: int
-    finished: bool
-
-
 def scene_for(
     simulation: ClosedLoop, maneuver: Maneuver, controller: str = "none", *, cutaway: bool = False
 ) -> RenderScene:
@@ -158,22 +118,22 @@ def scene_for(
     return RenderScene([car], maneuver.course, maneuver.ground)
 
 
-def drive(
-    simulation: ClosedLoop, scene: RenderScene, viewer: Viewer, pacer: FramePacer, keys: Keys | None = None
-) -> DriveResult:
+def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FramePacer, keys: Keys) -> tuple[float, bool]:
     """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
 
-    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation.
+    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation. `viewer` is
+    MuJoCo's passive viewer. Return the simulated time [s], and whether the drive reached its end.
     """
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)
-    keys = keys or Keys()
     keys.restart = False
-    done = pictures = 0
+    done = 0
     while viewer.is_running() and not keys.restart:
         now_s = done * timestep_s
         if keys.faster != 1.0:
-            pacer.speed, keys.faster = min(max(pacer.speed * keys.faster, _SLOWEST), _FASTEST), 1.0
+            pacer.change_speed(keys.faster)
+            keys.faster = 1.0
+        # Font and place are the default ones.
         viewer.set_texts((None, None, *_texts(simulation, now_s, pacer.speed, paused=keys.paused)))
         # Under one lock: a picture in between would combine the camera of one instant with the car of another.
         with viewer.lock():
@@ -181,9 +141,8 @@ def drive(
             scene.update()
             follow(viewer.cam, now_s)
             viewer.sync()
-        pictures += 1
         if done >= simulation.steps:
-            return DriveResult(now_s, pictures, finished=True)
+            return now_s, True
         if keys.paused:
             pacer.wait()
             continue
@@ -191,7 +150,7 @@ def drive(
         steps = max(1, min(target, simulation.steps) - done)
         simulation.advance(steps)
         done += steps
-    return DriveResult(done * timestep_s, pictures, finished=False)
+    return done * timestep_s, False
 
 
 class _Follow:
@@ -272,15 +231,13 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
     ):
         pacer = FramePacer(speed)
         while viewer.is_running():
-            driven = drive(simulation, scene, viewer, pacer, keys)
+            simulated_s, finished = drive(simulation, scene, viewer, pacer, keys)
             slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
-            if driven.finished:
-                print(
-                    f"{driven.simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr
-                )
+            if finished:
+                print(f"{simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr)
             elif not keys.restart:
-                print(f"closed at {driven.simulated_s:.1f} s{slow}", file=sys.stderr)
-            while driven.finished and viewer.is_running() and not keys.restart:
+                print(f"closed at {simulated_s:.1f} s{slow}", file=sys.stderr)
+            while finished and viewer.is_running() and not keys.restart:
                 time.sleep(0.05)
                 viewer.sync()
             pacer = FramePacer(pacer.speed)

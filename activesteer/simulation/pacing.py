@@ -17,16 +17,12 @@ _SPIN_S: Final = 0.15e-3
 
 
 class RealtimePacer:
-    """Clock of a run.
-
-    Attributes:
-        factor: Simulated seconds per second.
-    """
+    """Clock of a run. `factor` is the number of simulated seconds per second."""
 
     def __init__(self, factor: float, timestep_s: float) -> None:
         """Prepare the clock, which starts with the first step."""
-        self.factor = checked_number("realtime", factor, FACTOR)
-        self._interval_s = timestep_s / self.factor
+        self._factor = checked_number("realtime", factor, FACTOR)
+        self._interval_s = timestep_s / self._factor
         self._start_s: float | None = None
         self._steps = self._missed = 0
         self._late_s = np.empty(4096)
@@ -56,7 +52,7 @@ class RealtimePacer:
         late_s = self._late_s[: self._steps]
         p50, p99, most = (float(np.quantile(late_s, q)) for q in (0.5, 0.99, 1.0)) if self._steps else (0.0,) * 3
         return {
-            "factor": self.factor, "steps": self._steps, "missed_deadlines": self._missed,
+            "factor": self._factor, "steps": self._steps, "missed_deadlines": self._missed,
             "late_share": float(np.mean(late_s > LATE_S)) if self._steps else 0.0,
             "jitter_p50_s": p50, "jitter_p99_s": p99, "jitter_max_s": most,
         }  # fmt: skip

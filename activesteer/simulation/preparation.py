@@ -247,40 +247,20 @@ _LINEAR: Final = {"duration_s": 12.0, "steer.end_deg": 50.0}
 
 
 class Body(NamedTuple):
-    """Mass properties of the whole car at static ride.
-
-    Attributes:
-        mass_kg: Mass [kg].
-        yaw_inertia_kgm2: Inertia about the vertical axis through the centre of gravity [kg m2].
-        cg_to_front_m: l_V [m].
-        cg_to_rear_m: l_H [m].
-    """
+    """Mass properties of the whole car at static ride."""
 
     mass_kg: float
-    yaw_inertia_kgm2: float
-    cg_to_front_m: float
-    cg_to_rear_m: float
+    yaw_inertia_kgm2: float  # about the vertical axis through the centre of gravity
+    cg_to_front_m: float  # l_V
+    cg_to_rear_m: float  # l_H
 
 
-def linear_tests(vehicle: FileOrTable, overrides: Mapping[str, Any] | None = None) -> list[Scenario]:
-    """Return the tests at constant speed, limited to the linear range."""
-    return [
-        resolve("slowly_increasing_steer", vehicle, {**(overrides or {}), **_LINEAR, "speed_kmh": speed})
-        for speed in CONSTANT_SPEED_TESTS.values()
-    ]
-
-
-def single_track_of(scenarios: list[Scenario], run: Run) -> SingleTrackParameters:
-    """Return the single-track model that fits the car in the tests."""
-    body = body_of(scenarios[0].car)
-    return fitted(body, [handling_in(scenario, body, run) for scenario in scenarios])
-
-
-def with_identified_single_track(scenario: Scenario, run: Run) -> Scenario:
-    """Return the scenario with the single-track model of the car as it is, including its load."""
-    car = scenario.car
-    single_track = single_track_of([replace(test, car=car) for test in linear_tests("compact")], run)
-    return replace(scenario, car=replace(car, config=replace(car.config, single_track=single_track)))
+def identified(car: CarSpec) -> SingleTrackParameters:
+    """Return the single-track model of a car as it is, including its load, from tests in the linear range."""
+    body = body_of(car)
+    keys = [{**_LINEAR, "speed_kmh": speed} for speed in CONSTANT_SPEED_TESTS.values()]
+    tests = [replace(resolve("slowly_increasing_steer", overrides=each), car=car) for each in keys]
+    return fitted(body, [handling_in(test, body, _test_drive) for test in tests])
 
 
 def body_of(car: CarSpec) -> Body:
@@ -338,8 +318,9 @@ def with_amplitude_found(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTE
     Raises:
         ManeuverError: no amplitude gives the lateral acceleration.
     """
-    if scenario.car.config.single_track.source == IDENTIFY:
-        scenario = with_identified_single_track(scenario, _test_drive)
+    car = scenario.car
+    if car.config.single_track.source == IDENTIFY:
+        scenario = replace(scenario, car=replace(car, config=replace(car.config, single_track=identified(car))))
     # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
     search = replace(scenario.maneuver, fault=()).search
     if search is None:

@@ -107,11 +107,6 @@ class Recorder(Uncopyable):
         """Number of recorded rows, each with the values at the start of its step."""
         return int(self._tape["rows"][0])
 
-    @property
-    def room(self) -> int:
-        """Number of rows that still fit into the tape."""
-        return int(self._tape["room"][0])
-
     def make_room(self) -> None:
         """Take the rows from the tape, and flush a full block."""
         if self.rows - self._flushed == self._block_rows:

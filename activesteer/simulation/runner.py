@@ -93,10 +93,14 @@ def run_scenario(
 def _driven(
     simulation: Simulation, path: Path | None = None, progress: Callable[[float], None] | None = None
 ) -> Recording:
-    failure: ActiveSteerError | None = None
+    loop, steps, failure = simulation.loop, simulation.steps, None
+    chunk = steps if progress is None else round(1.0 / loop.vehicle.timestep_s)
     with simulation.recorded_to(path) if path is not None else nullcontext():
         try:
-            _drive(simulation, progress)
+            while not simulation.done:
+                simulation.advance(min(chunk, steps - loop.step_count))
+                if progress is not None:
+                    progress(loop.step_count / steps)
         except ActiveSteerError as error:
             failure = error
         recording = simulation.recording()
@@ -109,13 +113,3 @@ def _driven(
         )
         raise failure
     return recording
-
-
-def _drive(simulation: Simulation, progress: Callable[[float], None] | None) -> None:
-    if progress is None:
-        simulation.run()
-        return
-    steps, chunk = simulation.steps, round(1.0 / simulation.loop.vehicle.timestep_s)
-    for done in range(0, steps, chunk):
-        simulation.advance(min(chunk, steps - done))
-        progress(min(1.0, (done + chunk) / steps))

@@ -18,20 +18,15 @@ _SLOWER: Final = 0.95
 
 
 class ControlUnit(NamedTuple):
-    """Timing and inputs of a controller in the loop.
+    """Timing and inputs of a controller in the loop."""
 
-    Attributes:
-        every: Steps of the simulation between two calls.
-        delay: Steps that a command takes to arrive.
-        steering_ratio: Overall ratio by which the controller converts the angle of the steering angle sensor into the
-            driver's demand; 0 if it is told the demand itself.
-        uses_truth: Whether the controller gets the true measurement instead of the sensors' signals, and the motion as
-            a third argument.
-    """
-
-    every: int
-    delay: int
+    every: int  # steps of the simulation between two calls
+    delay: int  # steps that a command takes to arrive
+    # overall ratio by which the controller converts the angle of the steering angle sensor into the driver's
+    # demand; 0 if it is told the demand itself
     steering_ratio: float
+    # whether the controller gets the true measurement instead of the sensors' signals, and the motion as a third
+    # argument
     uses_truth: bool
 
 

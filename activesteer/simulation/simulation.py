@@ -216,28 +216,24 @@ class Simulation(Copyable):
             ControllerError: the actuator command is invalid, or the controller failed.
             SimulationDiverged: the state became non-finite, or the engine raised a warning.
         """
-        with self.loop.in_use:
-            return self._advance(steps, driver_command, actuator_command)
-
-    def _advance(
-        self, steps: int, driver_command: DriverCommand | None, actuator_command: ActuatorCommand | None
-    ) -> Measurement:
-        loop, left = self.loop, self.steps - self.loop.step_count
-        self._check_going_on()
-        if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
-            raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
-        if steps > left:
-            end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
-            raise ManeuverError(f"{end}; {steps} more steps were requested, {left} are left", value=steps, allowed=left)
-        given = _checked(loop, (driver_command, actuator_command), "Simulation.step was given")
-        with self._watched():
-            if self._pacer is None and self._link is None:
-                self._drive(int(steps), given)
-            else:
-                self._drive_by_the_clock(int(steps), given)
-            if self.done:
-                self._recorder.flush()
-        return loop.measurement
+        loop = self.loop
+        with loop.in_use:
+            self._check_going_on()
+            if isinstance(steps, bool) or not isinstance(steps, Integral) or steps < 0:
+                raise ParameterError(f"is {shown(steps)}; a whole number of steps, 0 or more, is needed", key="steps")
+            if steps > (left := self.steps - loop.step_count):
+                end = f"{self.scenario.maneuver.name} ends at {self.scenario.maneuver.duration_s:g} s (duration_s)"
+                problem = f"{end}; {steps} more steps were requested, {left} are left"
+                raise ManeuverError(problem, value=steps, allowed=left)
+            given = _checked(loop, (driver_command, actuator_command), "Simulation.step was given")
+            with self._watched():
+                if self._pacer is None and self._link is None:
+                    self._drive(int(steps), given)
+                else:
+                    self._drive_by_the_clock(int(steps), given)
+                if self.done:
+                    self._recorder.flush()
+            return loop.measurement
 
     def _drive(self, steps: int, given: Given) -> None:
         rows = self._recorder.rows

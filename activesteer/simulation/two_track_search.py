@@ -33,6 +33,10 @@ _STEADY_S: Final = ((2.0, 2.5), (4.5, 5.0))
 _STEPS_S: Final = (0.0, 0.5, 0.7, 2.5, 2.9, 5.0)
 _PEDAL: Final = 0.3
 _BRAKING_S: Final = (1.5, 2.5)
+_BRAKING: Final = {
+    "kind": "open_loop", "name": "braking", "speed_mps": 100.0 / 3.6, "duration_s": _BRAKING_S[1],
+    "brake": {"time_s": [0.0, 0.3, _BRAKING_S[1]], "pedal": [0.0, _PEDAL, _PEDAL]},
+}  # fmt: skip
 _EVERY: Final = 10
 """Rows between two samples of the fit."""
 
@@ -42,6 +46,7 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
     scenario = resolve(_steps(vehicle, overrides), vehicle, overrides)
     car = scenario.car.on()
     body = mass_properties(car.model, car.data)
+    wheels = [car.model.body(f"{wheel}_wheel").id for wheel in CORNERS]
     tracks_m = [_contact_y(car, f"{axle}l") - _contact_y(car, f"{axle}r") for axle in "fr"]
     turned = run(scenario)
     ay, roll = _channel(turned, "ay_mps2"), _channel(turned, "roll_rad")
@@ -64,8 +69,8 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
         roll_frequency_Hz=frequency_Hz,
         roll_damping=damping,
         roll_arm_m=max(0.0, (height_m - float(body.cg_m[2])) / (GRAVITY_MPS2 * gradient)),
-        pitch_gradient_radpmps2=_pitch_gradient(run(resolve(_braking(), vehicle, overrides))),
-        wheel_inertia_kgm2=_spin_inertia(car),
+        pitch_gradient_radpmps2=_pitch_gradient(run(resolve(_BRAKING, vehicle, overrides))),
+        wheel_inertia_kgm2=float(car.model.body_inertia[wheels].max(axis=1).mean()),  # about the axis
     )
 
 
@@ -81,13 +86,6 @@ def _steps(vehicle: FileOrTable, overrides: Mapping[str, Any] | None) -> dict[st
     }  # fmt: skip
 
 
-def _braking() -> dict[str, Any]:
-    return {
-        "kind": "open_loop", "name": "braking", "speed_mps": 100.0 / 3.6, "duration_s": _BRAKING_S[1],
-        "brake": {"time_s": [0.0, 0.3, _BRAKING_S[1]], "pedal": [0.0, _PEDAL, _PEDAL]},
-    }  # fmt: skip
-
-
 def _contact_y(car: Vehicle, wheel: str) -> float:
     """Return the lateral position of the road below the middle of a standing wheel [m]."""
     centre, axis = (
@@ -96,12 +94,6 @@ def _contact_y(car: Vehicle, wheel: str) -> float:
     )
     down = axis[2] * axis - np.array([0.0, 0.0, 1.0])  # in the plane of the wheel
     return float(centre[1] - centre[2] * down[1] / down[2])
-
-
-def _spin_inertia(car: Vehicle) -> float:
-    """Return the mean inertia of a wheel about its axis [kg m2]."""
-    model = car.model
-    return float(np.mean([model.body_inertia[model.body(f"{wheel}_wheel").id].max() for wheel in CORNERS]))
 
 
 def _channel(recording: RecordingLike, name: str) -> Array:
@@ -140,5 +132,4 @@ def _pitch_gradient(recording: RecordingLike) -> float:
 
 def two_track_lines(parameters: TwoTrackParameters) -> dict[str, str]:
     """Return keys and values of the table [two_track], rounded to the resolution of the tests."""
-    digits = {"load_height_m": 3, "roll_gradient_radpmps2": 5, "pitch_gradient_radpmps2": 5}
-    return {key: f"{value:.{digits.get(key, 3)}f}" for key, value in vars(parameters).items()}
+    return {key: f"{value:.{5 if 'gradient' in key else 3}f}" for key, value in vars(parameters).items()}

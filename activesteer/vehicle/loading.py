@@ -247,7 +247,7 @@ def _force_block(
         "dampers": [_damper(model, corner, parameters) for corner in CORNERS],
         "areas": [np.array([area], fb.AREA) for area in road.areas()],
     }
-    if isinstance(road, LaidRoad) and road.path is not None:
+    if isinstance(road, LaidRoad):
         grid = PathGrid.of(road.path)
         sections["path_points"], sections["path_cells"] = [grid.points], [grid.cells]
         sections["path_grids"] = [np.array([grid[:6]], fb.PATH_GRID)]

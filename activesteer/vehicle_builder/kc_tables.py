@@ -28,7 +28,7 @@ from scipy.interpolate import make_lsq_spline
 from activesteer.config import Source, build, read_toml
 from activesteer.core import limits
 from activesteer.core.conventions import Array
-from activesteer.core.files import csv_number, is_file, is_folder, read_csv
+from activesteer.core.files import is_file, is_folder, read_csv
 from activesteer.core.units import UNIT_NAMES, alike, find_unit
 from activesteer.errors import ParameterError, nearest_names
 from activesteer.rigs.kc.result import CHANNELS, OF_THE_AXLE, TESTS
@@ -188,7 +188,12 @@ def _raw_columns(file: Path) -> dict[str, Array]:
                 f"has {len(row.cells)} cells, the first row {len(heads)}", file=file.name, line=row.line
             )
     return {
-        head: np.array([csv_number(row.cells[index], ParameterError, file.name, row.line, head) for row in rows[1:]])
+        head: np.array(
+            [
+                limits.number_in(row.cells[index], ParameterError, file=file.name, line=row.line, key=head)
+                for row in rows[1:]
+            ]
+        )
         for index, head in enumerate(heads)
         if head
     }

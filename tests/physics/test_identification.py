@@ -11,8 +11,7 @@ import pytest
 
 from activesteer.controllers import SingleTrackParameters
 from activesteer.scenario import load_car
-from activesteer.simulation.preparation import linear_tests, single_track_of
-from activesteer.simulation.runner import run_scenario
+from activesteer.simulation.preparation import identified
 from activesteer.studies.linear.identification import (
     CONSTANT_SPEED_TESTS,
     RADIUS_TEST,
@@ -27,7 +26,7 @@ PARAMETERS = [field.name for field in dataclasses.fields(SingleTrackParameters) 
 
 @functools.cache
 def single_track() -> SingleTrackParameters:
-    return single_track_of(linear_tests("compact"), run_scenario)
+    return identified(load_car("compact"))
 
 
 @functools.cache
@@ -49,7 +48,7 @@ def test_characteristic_speed_is_that_of_the_class():
 
 
 def test_heavier_car_is_seen_by_the_identification():
-    heavier = single_track_of(linear_tests("compact", {"factors.mass": 1.1}), run_scenario)
+    heavier = identified(load_car("compact", {"factors.mass": 1.1}))
     assert heavier.mass_kg > single_track().mass_kg + 100.0
 
 

@@ -7,7 +7,6 @@ import pytest
 
 from activesteer.core.files import (
     atomic_write,
-    csv_number,
     delete_temporary_files,
     make_folder,
     reading,
@@ -15,6 +14,7 @@ from activesteer.core.files import (
     write_text,
     writing,
 )
+from activesteer.core.limits import number_in
 from activesteer.errors import ParameterError, PlaybackError
 from tests.raising import raises
 
@@ -120,7 +120,8 @@ def test_path_is_shown_without_what_a_terminal_would_obey() -> None:
 
 @pytest.mark.parametrize("cell", ["", "x", "nan", "-inf", "1e308", "-1e308", "1.1e12"])
 def test_a_cell_without_a_plausible_number_is_refused(cell: str) -> None:
-    assert csv_number("-1e12", ParameterError, "a.csv", 2, "x_m") == -1e12
-    with raises(ParameterError, file="a.csv", line=2, key="x_m", value=cell) as refused:
-        csv_number(cell, ParameterError, "a.csv", 2, "x_m")
+    place = {"file": "a.csv", "line": 2, "key": "x_m"}
+    assert number_in("-1e12", ParameterError, **place) == -1e12
+    with raises(ParameterError, value=cell, **place) as refused:
+        number_in(cell, ParameterError, **place)
     assert ("1e+12" in str(refused.value)) is ("e" in cell)

@@ -43,7 +43,6 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.tyre_parameters import TYRE_RECORD
 from activesteer.vehicle import force_block as fb
-from activesteer.vehicle.brakes.records import BRAKE_SETUP
 from activesteer.vehicle.channels.corners import design_heights_m
 from activesteer.vehicle.channels.native_channels import Actuator, AxialForce
 from activesteer.vehicle.faults import part_of
@@ -72,23 +71,14 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """A car in the form of an export.
+    """A car in the form of an export."""
 
-    Attributes:
-        name: Name of the vehicle.
-        variables: Its variables; the value reference is the place.
-        token: Digest of everything that decides its behaviour.
-        library: The shared library.
-        engine: The engine's library beside it, and its name.
-        timestep_s: Length of a step [s].
-    """
-
-    name: str
-    variables: list[Variable]
-    token: str
+    name: str  # of the vehicle
+    variables: list[Variable]  # its variables; the value reference is the place
+    token: str  # digest of everything that decides its behaviour
     library: bytes
-    engine: tuple[str, bytes]
-    timestep_s: float
+    engine: tuple[str, bytes]  # the engine's library beside it, and its name
+    timestep_s: float  # length of a step [s]
 
 
 def export_fmu(scenario: Scenario, path: Path, version: int = 2) -> Export:
@@ -212,11 +202,6 @@ def _seeds(loop: ClosedLoop) -> bytes:
     return table.tobytes()
 
 
-def _sensor_places(model: mujoco.MjModel) -> list[int]:
-    """Return the places of the sensors of `PLACES` in the engine's sensor data."""
-    return [sensor_columns(model, name).start + (2 if name.endswith("_position") else 0) for name in PLACES]
-
-
 def _numbers(values: Any) -> str:
     return ", ".join(str(int(value)) if isinstance(value, int) else _real(float(value)) for value in values)
 
@@ -269,10 +254,10 @@ def _data(
         **{f"TYRE_{name}": offset(TYRE_RECORD, name) // 8 for name in ("LMUX", "LMUY", "LKY", "LKX")},
         "CHASSIS": chassis, "CG_SITE": model.site("cg").id, "SETTLING_STEPS": round(_SETTLING_S / vehicle.timestep_s),
     }  # fmt: skip
-    assert BRAKE_SETUP.fields is not None
     base = dict(zip(COMMANDS, (*numbers_in(DriverCommand()), *numbers_in(ActuatorCommand())), strict=True))
     base["front_steer_demand_rad"] = 0.0
     stride = fb.WHEEL.itemsize // 8
+    places = [sensor_columns(model, name).start + (2 if name.endswith("_position") else 0) for name in PLACES]
     arrays: dict[str, tuple[str, Any]] = {
         "COMMANDS": ("double", base.values()),
         "COMMAND_INPUTS": ("int", [COMMANDS.index(name) for name in CARRIED_OUT]),
@@ -282,7 +267,7 @@ def _data(
         "TYRES": ("int", [tyres + wheel * (TYRE_RECORD.itemsize // 8) for wheel in range(4)]),
         "TORQUE_PER_PRESSURE": ("double", setup["torque_per_pressure_NmpPa"]),
         "RADIUS_M": ("double", setup["rolling_radius_m"]),
-        "SENSOR_PLACES": ("int64_t", _sensor_places(model)),
+        "SENSOR_PLACES": ("int64_t", places),
         "DESIGN": ("double", [*design_heights_m(model), vehicle.parameters.steering.ratio]),
         "BIAS_RMS": ("double", [0.0] if sensors is None else sensors.bias_rms),
     }  # fmt: skip

@@ -4,6 +4,6 @@ In: an FMU, which is code of others.
 Out: a controller or driver for the loop.
 """
 
-from activesteer.coupling.fmu.plugin import find_fmu, is_fmu, isolated
+from activesteer.coupling.fmu.plugin import find_fmu, isolated
 
-__all__ = ["find_fmu", "is_fmu", "isolated"]
+__all__ = ["find_fmu", "isolated"]

@@ -165,7 +165,7 @@ class FmuBlock:
     def __init__(self, fmu: Fmu, setup: Any, parameters: Mapping[str, Any]) -> None:
         """Instantiate and initialise the FMU."""
         spec, every = fmu.spec_for(setup, parameters)
-        self._about = fmu, setup, parameters, every, spec.step_s
+        self._fmu, self._setup, self._parameters, self._every, self._step_s = fmu, setup, parameters, every, spec.step_s
         limit_s = parameters.get(ISOLATE)
         try:
             shared = _Shared(LocalInstance(spec) if limit_s is None else IsolatedInstance(spec, limit_s))
@@ -175,8 +175,7 @@ class FmuBlock:
 
     def _bind(self, shared: _Shared, held: Any, steps: int) -> None:
         """Join the users of an instance."""
-        fmu, _, _, self._every, _ = self._about
-        kind = fmu.kind
+        fmu, kind = self._fmu, self._fmu.kind
         self._shared, self._block = shared, shared.new_block()
         self._held, self._steps = held, steps
         self._reads: list[Any] = [
@@ -201,8 +200,7 @@ class FmuBlock:
             return self._held
         shared = self._shared
         command: list[Any] = [*self._default]
-        fmu, setup, _, _, _ = self._about
-        kind = fmu.kind
+        fmu, kind = self._fmu, self._fmu.kind
         try:
             values = []
             for message, field, wheel, factor, offset in self._reads:
@@ -230,30 +228,28 @@ class FmuBlock:
             command[field] = whole(round(command[field]))
         self._held = new_message(kind.result, command)
         if self._unchecked:
-            self._held = kind.checked(self._held, fmu.path.name, setup)
+            self._held = kind.checked(self._held, fmu.path.name, self._setup)
         return self._held
 
     def _when(self) -> str:
         """The time of the current step, in words."""
-        *_, step_s = self._about
-        return f", {(self._steps - 1) // self._every * step_s:g} s after its initialisation"
+        return f", {(self._steps - 1) // self._every * self._step_s:g} s after its initialisation"
 
     def _unread(self, messages: Sequence[Any]) -> Exception:
         """Return the error for an input without a value, such as the curvature of a manoeuvre that has none."""
-        fmu, *_ = self._about
         empty = [
-            link.signal for link in fmu.inputs for place in link.places
+            link.signal for link in self._fmu.inputs for place in link.places
             if messages[place.message][place.field] is None
         ]  # fmt: skip
-        return fmu.fail(f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
+        return self._fmu.fail(f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
 
     def _refused(self, results: Sequence[float], field: int, value: float) -> Exception:
         """Return the error for an output that is not finite or out of its range."""
-        fmu, setup, *_ = self._about
-        kind = fmu.kind
+        fmu, kind = self._fmu, self._fmu.kind
         if math.isfinite(value):
             try:
-                kind.checked(kind.result()._replace(**{kind.result._fields[field]: value}), fmu.path.name, setup)
+                command = kind.result()._replace(**{kind.result._fields[field]: value})
+                kind.checked(command, fmu.path.name, self._setup)
             except kind.error as reason:
                 return reason
         names = [link.variable.name for link in fmu.outputs for _ in link.places]
@@ -262,14 +258,14 @@ class FmuBlock:
 
     def __deepcopy__(self, _memo: dict[int, Any]) -> FmuBlock:
         other = FmuBlock.__new__(FmuBlock)
-        other._about = self._about
+        other._fmu, other._setup, other._parameters = self._fmu, self._setup, self._parameters
+        other._every, other._step_s = self._every, self._step_s
         self._call(lambda shared: other._bind(shared, self._held, self._steps))
         self._call(lambda shared: shared.states.__setitem__(other._block, shared.instance.save()))
         return other
 
     def __reduce__(self) -> Any:
-        fmu, setup, parameters, *_ = self._about
-        if not fmu.description.serialises_state:
+        if not self._fmu.description.serialises_state:
             raise self._stateless("turn its state into bytes (canSerializeFMUstate), as another process needs it")
 
         def serialised(shared: _Shared) -> bytes:
@@ -280,24 +276,22 @@ class FmuBlock:
                 shared.instance.forget(state)
 
         content = self._call(serialised)
-        return _revived, (fmu, setup, parameters, content, self._held, self._steps)
+        return _revived, (self._fmu, self._setup, self._parameters, content, self._held, self._steps)
 
     def _call(self, use: Callable[[_Shared], Any]) -> Any:
         """Use the instance in the state of this block."""
-        fmu, *_ = self._about
-        if not fmu.description.saves_state:
+        if not self._fmu.description.saves_state:
             raise self._stateless("save its state (canGetAndSetFMUstate)")
         try:
             with self._shared.lock:
                 self._shared.turn_to(self._block)
                 return use(self._shared)
         except FmuFault as fault:
-            raise fmu.fail(f"its state cannot be copied: {fault}") from fault
+            raise self._fmu.fail(f"its state cannot be copied: {fault}") from fault
 
     def _stateless(self, able: str) -> Exception:
-        fmu, *_ = self._about
-        name = shown(fmu.path.name)
-        return fmu.fail(f"this FMU cannot {able}; a run with it can be neither saved nor copied: {name}")
+        name = shown(self._fmu.path.name)
+        return self._fmu.fail(f"this FMU cannot {able}; a run with it can be neither saved nor copied: {name}")
 
     def __del__(self) -> None:
         if (shared := getattr(self, "_shared", None)) is not None:
@@ -344,7 +338,6 @@ def _revived(fmu: Fmu, setup: Any, parameters: Mapping[str, Any], content: bytes
     return block
 
 
-ENDING: Final = ".fmu"
 ISOLATE: Final = "isolate"
 _ISOLATE_RANGE: Final = (0.001, 3600.0)
 _MESSAGES: Final = {"controller": (DriverCommand, Measurement), "driver": (Setpoint, Measurement, Motion)}
@@ -459,11 +452,6 @@ def _grouped(links: Sequence[Link]) -> list[Group]:
     return [Group(*key, [v.reference for v in part], sum(v.size for v in part)) for key, part in groups]
 
 
-def is_fmu(given: Any) -> bool:
-    """Return whether a block is given as an FMU."""
-    return isinstance(given, (str, os.PathLike)) and os.fspath(given).partition("?")[0].lower().endswith(ENDING)
-
-
 def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     """Read an FMU as a controller or driver.
 
@@ -484,7 +472,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 def isolated(given: Any, limit_s: float) -> Any:
     """Return an FMU in its own process, or any other block unchanged."""
-    if not is_fmu(given):
+    text = os.fspath(given) if isinstance(given, (str, os.PathLike)) else ""
+    if not text.partition("?")[0].lower().endswith(".fmu"):
         return given
-    text = os.fspath(given)
     return f"{text}{'&' if '?' in text else '?'}{ISOLATE}={limit_s:g}"

@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import pytest
 
-from activesteer.maneuver.lane_changes import cones, lanes
+from activesteer.maneuver.lane_changes import LaneLayout, cones, lanes
 
 WIDTHS = (1.6, 1.8, 2.0)
 
 
 @pytest.mark.parametrize("b", WIDTHS)
 def test_lanes_of_part_1(b):
-    entry, aside, back = lanes("iso_3888_1", b, 30.0, 1.0)
+    entry, aside, back = lanes(LaneLayout(), b, 1.0)
     assert [(lane.start_x_m, lane.end_x_m) for lane in (entry, aside, back)] == [(30, 45), (75, 100), (125, 155)]
     widths = [lane.left_y_m - lane.right_y_m for lane in (entry, aside, back)]
     assert widths == pytest.approx([1.1 * b + 0.25, 1.2 * b + 0.25, 1.3 * b + 0.25])
@@ -21,7 +21,7 @@ def test_lanes_of_part_1(b):
 
 
 def test_a_course_that_resembles_the_standard_is_scaled():
-    entry, aside, back = lanes("iso_3888_1", 2.0, 30.0, 1.0, 0.8, 0.5)
+    entry, aside, back = lanes(LaneLayout(length_factor=0.8, offset_factor=0.5), 2.0, 1.0)
     assert [lane.start_x_m for lane in (entry, aside, back)] == [30.0, 66.0, 106.0]
     assert aside.end_x_m - aside.start_x_m == pytest.approx(20.0)
     assert 0.5 * (aside.left_y_m + aside.right_y_m) == pytest.approx(1.75)
@@ -30,7 +30,7 @@ def test_a_course_that_resembles_the_standard_is_scaled():
 
 @pytest.mark.parametrize("b", WIDTHS)
 def test_lanes_of_part_2(b):
-    entry, aside, back = lanes("iso_3888_2", b, 10.0, 1.0)
+    entry, aside, back = lanes(LaneLayout(standard="iso_3888_2", entry_m=10.0), b, 1.0)
     assert [(lane.start_x_m, lane.end_x_m) for lane in (entry, aside, back)] == [(10, 22), (35.5, 46.5), (59, 71)]
     assert back.end_x_m - entry.start_x_m == 61.0
     widths = [lane.left_y_m - lane.right_y_m for lane in (entry, aside, back)]
@@ -42,13 +42,14 @@ def test_lanes_of_part_2(b):
 
 @pytest.mark.parametrize("standard", ["iso_3888_1", "iso_3888_2"])
 def test_lanes_to_the_right_are_mirrored(standard):
-    for left, right in zip(lanes(standard, 1.8, 30.0, 1.0), lanes(standard, 1.8, 30.0, -1.0), strict=True):
+    layout = LaneLayout(standard=standard)
+    for left, right in zip(lanes(layout, 1.8, 1.0), lanes(layout, 1.8, -1.0), strict=True):
         assert right == left._replace(right_y_m=-left.left_y_m, left_y_m=-left.right_y_m)
 
 
 @pytest.mark.parametrize("standard", ["iso_3888_1", "iso_3888_2"])
 def test_cones_stand_in_pairs_on_the_edges_from_end_to_end(standard):
-    course = lanes(standard, 1.8, 30.0, 1.0)
+    course = lanes(LaneLayout(standard=standard), 1.8, 1.0)
     points = [tuple(point) for point in cones(course).tolist()]
     assert len(points) == len(set(points))
     for lane in course:

@@ -14,8 +14,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.braking import BrakeInTurn
 from activesteer.maneuver.steering_tests import SineWithDwell, StepSteer
 from activesteer.scenario import describe, resolve
-from activesteer.simulation.preparation import linear_tests, single_track_of, with_amplitude_found
-from activesteer.simulation.runner import run_scenario
+from activesteer.simulation.preparation import identified, with_amplitude_found
 from tests.raising import raises
 
 
@@ -32,7 +31,7 @@ def dwell_deg(factor: float = 1.0, **overrides: Any) -> float:
 def expected_deg() -> float:
     """A from the understeer gradient: ratio times (wheelbase over radius, and the part of the characteristic speed)."""
     scenario = resolve("sine_with_dwell")
-    car, speed = single_track_of(linear_tests("compact"), run_scenario), scenario.maneuver.speed_mps
+    car, speed = identified(scenario.car), scenario.maneuver.speed_mps
     assert car.characteristic_speed_mps is not None
     ackermann = (car.cg_to_front_m + car.cg_to_rear_m) * 0.3 * 9.81 / speed**2
     understeer = 1.0 + (speed / car.characteristic_speed_mps) ** 2
