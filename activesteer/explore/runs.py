@@ -9,7 +9,6 @@ import shlex
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -37,13 +36,15 @@ from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.road.course import Footprint
 from activesteer.scenario import Scenario, resolve, value_of
-from activesteer.simulation.preparation import with_amplitude_found
+from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
 
 _MANEUVER: Final = {
     "speed_kmh": (20.0, 160.0, 1.0),
     "road.mu": (0.1, 1.1, 0.01),
+    "road.mu_left": (0.1, 1.1, 0.01),
+    "road.mu_right": (0.1, 1.1, 0.01),
     "steer.lateral_acceleration_mps2": (0.5, 9.0, 0.1),
     "steer.amplitude_factor": (0.5, 8.0, 0.1),
     "cones.spacing_m": (20.0, 60.0, 0.5),
@@ -104,8 +105,9 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
     for key, (low, high, step) in ranges.items():
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
-            # A manoeuvre that begins at rest has its speeds in its phases.
-            if _is_number(value) and not (key == "speed_kmh" and value == 0.0):
+            # A manoeuvre that begins at rest has its speeds in its phases, and a road of two sides its friction there.
+            elsewhere = key == "road.mu" and value_of(scenario, "road.mu_left") is not None
+            if _is_number(value) and not elsewhere and not (key == "speed_kmh" and value == 0.0):
                 yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
@@ -293,17 +295,12 @@ class Runs:
 
         While a slider moves, the amplitude is that of the last search, else a new one.
         """
-        maneuver: Any = scenario.maneuver
-        if maneuver.search is None:
-            return with_amplitude_found(scenario), ""
         key = choice.maneuver, choice.vehicle
-        if choice.dragging and key in self._held_rad:
-            held = replace(scenario, maneuver=maneuver.with_amplitude(self._held_rad[key]))
-            return held, " (amplitude as before, until you let go)"
-        ready = with_amplitude_found(scenario)
-        steer: Any = ready.maneuver
-        self._held_rad[key] = steer.steer.steering_wheel_rad
-        return ready, ""
+        held = choice.dragging and key in self._held_rad
+        if not held and (angle_rad := searched_angle(scenario)) is not None:
+            self._held_rad[key] = angle_rad
+        found = with_amplitude_found(scenario, angle_rad=self._held_rad.get(key))
+        return found, " (amplitude as before, until you let go)" if held else ""
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
         """Return the recording of a run, or None if a newer choice has come."""
@@ -357,6 +354,7 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
             shown = size if math.isfinite(size) else None
-            digits = 0 if metric.whole else None  # by size
+            # Times differ by milliseconds; other values have digits by their size.
+            digits = 0 if metric.whole else 3 if metric.unit_name == "s" else None
             found.append({"title": title, "unit": metric.unit_name, "value": shown, "digits": digits})
     return found

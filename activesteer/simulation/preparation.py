@@ -305,12 +305,24 @@ def fitted(body: Body, tests: list[dict[str, float]]) -> SingleTrackParameters:
     )
 
 
-def with_amplitude_found(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> Scenario:
+def searched_angle(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> float | None:
+    """Return the steering wheel angle that the search of the manoeuvre finds [rad], or None if it has no search."""
+    # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
+    search = replace(scenario.maneuver, fault=()).search
+    if search is None:
+        return None
+    return amplitude(replace(scenario, car=scenario.car.with_ideal_sensors()), search, timestep_s)
+
+
+def with_amplitude_found(
+    scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S, angle_rad: float | None = None
+) -> Scenario:
     """Return the scenario with the results of all searches: single-track model, steering wheel amplitude.
 
     Args:
         scenario: A scenario.
         timestep_s: Step of the simulation [s].
+        angle_rad: A `searched_angle` from before, which counts in place of a search [rad].
 
     Returns:
         A scenario whose input is the same for every controller.
@@ -321,12 +333,11 @@ def with_amplitude_found(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTE
     car = scenario.car
     if car.config.single_track.source == IDENTIFY:
         scenario = replace(scenario, car=replace(car, config=replace(car.config, single_track=identified(car))))
-    # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
-    search = replace(scenario.maneuver, fault=()).search
-    if search is None:
+    search = scenario.maneuver.search
+    angle_rad = searched_angle(scenario, timestep_s) if angle_rad is None else angle_rad
+    if search is None or angle_rad is None:
         return scenario
-    found = search.accept(amplitude(replace(scenario, car=scenario.car.with_ideal_sensors()), search, timestep_s))
-    return replace(scenario, maneuver=replace(found, fault=scenario.maneuver.fault))
+    return replace(scenario, maneuver=search.accept(angle_rad))
 
 
 def prepared(

@@ -1,5 +1,5 @@
 // Curves over time and tracks from above, of the present runs and, pale, of the previous ones.
-import { element, number, onTheme, paint, runColour } from "./look.js";
+import { element, number, onTheme, paint, runColour, slippery } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 const HEIGHT = 170, CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
@@ -49,10 +49,15 @@ export class Curves {
       }
       this.panel(title, panelOf, lines, data);
     }
+    this.again();
   }
 
-  // Mark an instant on all curves, which share their cursor.
+  // New curves have their scales in the next frame.
+  again() { requestAnimationFrame(() => { if (this.time != null) this.at(this.time); }); }
+
+  // Mark a time on all curves, which share their cursor.
   at(time) {
+    this.time = time;
     const plot = this.plots.values().next().value?.plot;
     if (!plot) return;
     this.marking = true;
@@ -87,6 +92,7 @@ export class Curves {
       this.box.append(figure);
       shown = { figure, holder, values };
       this.plots.set(title, shown);
+      holder.addEventListener("mouseleave", () => this.again()); // back to the time of the pictures
     } else shown.plot.destroy();
     shown.key = key;
     const axis = (size, unit = "") => ({ values: (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit)), stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
@@ -95,11 +101,11 @@ export class Curves {
       cursor: { y: false, sync: { key: "explore" }, drag: { x: false, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [axis(26, " s"), axis(44)],
-      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
+      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), auto: !line.ghost, width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
       hooks: { drawAxes: [(u) => this.marks(u)], setCursor: [(u) => {
         const i = u.cursor.idx;
         shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `border-bottom: 2px solid ${runColour(line.place)}` }, number(u.data[k + 1][i])), " "]))]));
-        if (i != null && u.cursor.event && !this.marking) this.pointed(u.data[0][i]);
+        if (i != null && u.cursor.event && !this.marking) this.pointed(this.time = u.data[0][i]);
       }] },
     }, data, shown.holder);
   }
@@ -151,7 +157,8 @@ export class Track {
     const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };
     pen.font = FONT;
     pen.fillStyle = paint("patch");
-    for (const { corners } of course.patches) { pen.beginPath(); for (const [x, y] of corners) pen.lineTo(...place(x, y)); pen.fill(); }
+    for (const { corners, mu } of course.patches) { pen.globalAlpha = slippery(mu); pen.beginPath(); for (const [x, y] of corners) pen.lineTo(...place(x, y)); pen.fill(); }
+    pen.globalAlpha = 1;
     pen.fillStyle = paint("lane");
     for (const lane of course.lanes) {
       const [start, end] = lane.x, [below, above] = lane.y;
@@ -190,7 +197,10 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    const frictions = [...new Set(course.patches.map(({ mu }) => mu))].slice(0, 3);
-    pen.fillText(`from above, ${Math.round(right - left)} m${course.path ? "; dashed: path of the course" : ""}${frictions.length ? `; blue: friction ${frictions.join(", ")}` : ""}${stretch > 1.05 ? `; cars and widths are ${stretch.toFixed(1)} times larger` : ""}`, 10, height - 7);
+    const frictions = [...new Set(course.patches.map(({ mu }) => mu))].filter((mu) => slippery(mu)).slice(0, 3);
+    const caption = [`from above, ${Math.round(right - left)} m`, course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, stretch > 1.05 && `cars and widths are ${stretch.toFixed(1)} times larger`].filter(Boolean);
+    const rows = [[]];
+    for (const part of caption) { if (rows.at(-1).length && pen.measureText([...rows.at(-1), part].join("; ")).width > width - 20) rows.push([]); rows.at(-1).push(part); }
+    rows.reverse().forEach((row, i) => pen.fillText(row.join("; "), 10, height - 7 - 15 * i));
   }
 }

@@ -24,7 +24,7 @@ export class Drive {
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
     $("drive-controller").addEventListener("change", () => { this.values(); if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
-    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => this.act({ mu: +$("drive-mu").value })]]) {
+    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); }]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
       $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
     }
@@ -114,7 +114,8 @@ export class Drive {
     // Only drives of the same course with the same car, control, speed and friction can be compared.
     this.setting = this.settings();
     this.timed = header.cones.length > 0 || header.radius_m > 0;
-    this.way = header.radius_m > 0 ? "Last lap" : "First to last gate";
+    this.rounds = header.radius_m > 0;
+    this.way = this.rounds ? "Last lap" : "First to last gate";
     this.scene.setShape(header.shape, arrays);
     this.scene.car("you", 2);
     this.scene.setCourse({ ...header, radius: header.radius_m });
@@ -216,7 +217,7 @@ export class Drive {
   }
 
   gauges(header) {
-    const lap = header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
+    const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": this.scene.cones.length ? `${this.struck}` : "–",
@@ -227,6 +228,8 @@ export class Drive {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
+    const finished = !this.rounds && header.last_lap_s != null;
+    $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
     $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "";
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }

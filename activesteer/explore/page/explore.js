@@ -200,7 +200,7 @@ function showTitle(title) {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), small.matches ? shortName(run) : run.label)));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
@@ -309,14 +309,21 @@ const fit = () => { $("choice").open = !small.matches; showSliders(); };
 small.addEventListener("change", fit);
 fit();
 addEventListener("hashchange", readAddress);
-for (const id of NAMED) $(id).addEventListener("change", () => describe());
+// On a phone, the choice makes room for its results.
+for (const id of NAMED) $(id).addEventListener("change", () => { if (small.matches) $("choice").open = false; describe(); });
 $("group").addEventListener("change", showGroup);
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
 $("save").addEventListener("click", () => { $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
-for (const what of ["command", "python"]) $(`copy-${what}`).addEventListener("click", () => navigator.clipboard.writeText($(what).textContent));
+for (const what of ["command", "python"]) {
+  $(`copy-${what}`).addEventListener("click", async ({ target }) => {
+    await navigator.clipboard.writeText($(what).textContent);
+    target.textContent = "Copied";
+    setTimeout(() => { target.textContent = "Copy"; }, 1500);
+  });
+}
 $("theme").addEventListener("click", () => setTheme(!dark()));
 onTheme(showFigures);
 for (const name of ["explore", "drive"]) {

@@ -10,6 +10,9 @@ export const dark = () => root.classList.contains("dark");
 export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
 export const runColour = (place) => (dark() ? data.dark : data.light)[place];
 
+// How slippery a road looks: 0 for dry asphalt to 1 for packed snow.
+export const slippery = (mu) => Math.min(1, Math.max(0, (0.9 - mu) / 0.6));
+
 export function setTheme(isDark) {
   root.classList.toggle("dark", isDark);
   for (const watcher of watchers) watcher();

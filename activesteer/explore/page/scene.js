@@ -1,6 +1,6 @@
 // Cars, road and cones in three dimensions. Axes are those of ISO 8855: x forward, y left, z up.
 import * as THREE from "./three.module.min.js";
-import { onTheme, paint, runColour } from "./look.js";
+import { onTheme, paint, runColour, slippery } from "./look.js";
 
 const CAMERA_BACK = 9.5, CAMERA_UP = 3.4, AHEAD = 3, SLOW_MPS = 1;
 const SPREAD_BACK = 2, SPREAD_UP = 0.7; // Way of the camera backwards and upwards for each metre between the cars and their middle.
@@ -198,7 +198,14 @@ export class Scene {
     car.trail.geometry.setDrawRange(0, car.points);
   }
 
-  setCourse({ cones, lanes, radius = 0, line = [], patches = [] }) {
+  // A slippery road is lighter and bluer, as snow is.
+  tint(mu) {
+    this.ground.material.color.setRGB(1, 1, 1).lerp(new THREE.Color(1.5, 1.75, 2.1), slippery(mu));
+    this.stale = true;
+  }
+
+  setCourse({ cones, lanes, radius = 0, line = [], patches = [], mu = 0.9 }) {
+    this.tint(mu);
     this.course.clear();
     this.cones = cones.map(([x, y]) => {
       const cone = new THREE.Mesh(new THREE.ConeGeometry(0.145, 0.5, 16), new THREE.MeshLambertMaterial({ color: 0xf07d00 }));
@@ -209,9 +216,9 @@ export class Scene {
       this.course.add(cone, shadow);
       return cone;
     });
-    for (const { corners } of patches) {
+    for (const { corners, mu: friction } of patches) {
       const shape = new THREE.Shape(corners.map(([x, y]) => new THREE.Vector2(x, y)));
-      const patch = new THREE.Mesh(new THREE.ShapeGeometry(shape), new THREE.MeshBasicMaterial({ color: 0xa9cdf0, transparent: true, opacity: 0.5, depthWrite: false, side: THREE.DoubleSide }));
+      const patch = new THREE.Mesh(new THREE.ShapeGeometry(shape), new THREE.MeshBasicMaterial({ color: 0xa9cdf0, transparent: true, opacity: 0.55 * slippery(friction), depthWrite: false, side: THREE.DoubleSide }));
       patch.renderOrder = -3;
       patch.position.z = -0.01;
       this.course.add(patch);

@@ -13,7 +13,7 @@ import activesteer
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
 from activesteer.explore.runs import Runs
-from activesteer.resources import find_maneuver
+from activesteer.resources import find_maneuver, list_maneuvers
 
 OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
 CHOICE: dict[str, Any] = {"maneuver": "step_steer", "controllers": ("none", "ars")}
@@ -45,6 +45,19 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
     assert amplitudes[1] == pytest.approx(amplitudes[0], rel=1e-3)  # the column twists a little
     assert amplitudes[2] < 0.9 * amplitudes[0]  # 0.4 g needs less steering at a higher speed
     assert ["amplitude as before" in title for title in titles] == [False, True, False]
+
+
+@pytest.mark.parametrize("maneuver", list_maneuvers())
+def test_every_manoeuvre_starts_and_holds_what_its_search_found_while_a_slider_moves(maneuver: str, tmp_path: Path):
+    runs = Runs(Folder(tmp_path))
+    sliders = {slider["key"]: slider for slider in runs.describe(Describe(maneuver=maneuver)).header["sliders"]}
+    # The run itself is dropped: a newer choice waits.
+    for dragging in (False, True):
+        assert list(runs.run(RunRequest(maneuver=maneuver, dragging=dragging), lambda: True)) == []
+    # No slider that can only fail: a road of two sides has its friction there.
+    for key in [key for key in sliders if key.startswith("road.mu")]:
+        assert list(runs.run(RunRequest(maneuver=maneuver, values={key: 0.55}), lambda: True)) == []
+    assert ("road.mu" in sliders) != ("road.mu_left" in sliders)
 
 
 def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
