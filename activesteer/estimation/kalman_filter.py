@@ -339,8 +339,6 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
 def reopen(known, memory):
     """Make the friction as unknown as at the start: the car has met another road."""
     covariance = memory.covariance
-    # The friction of the old road says nothing about the new one: behind ice, angles were computed for ice.
-    memory.state[FRICTION] = known.friction
     for place, size in ((FRICTION, known.friction_std), (REAR_RATIO, _NEW_RATIO_STD)):
         variance = max(covariance[place, place], size * size)
         covariance[place, :] = covariance[:, place] = 0.0

@@ -82,24 +82,6 @@ def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_sn
     assert np.abs(controlled["sideslip_rad"][before]).max() < math.radians(1.0)
 
 
-@pytest.mark.parametrize("controller", ["lqr", "integrated"])
-def test_behind_ice_a_car_is_not_steered_as_on_ice(controller: str):
-    """The estimator forgets the friction of the ice. Where it kept it, the car ran 0.4 m wider than without control."""
-    pytest.importorskip("daqp")
-    changes = {
-        "load.payload_kg": 282.0, "load.payload_forward_change_m": 0.271, "load.roof_kg": 77.2,
-        "factors.front_cornering_stiffness": 1.021, "factors.rear_cornering_stiffness": 0.906,
-        "factors.front_tyre_friction": 0.985, "factors.rear_tyre_friction": 1.01,
-        "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 11.12, "sensors.seed": 13,
-        "road.mu": 0.894, "road.patches.0.mu": 0.221, "speed_kmh": 70.6, "duration_s": 10.0,
-    }  # fmt: skip
-    errors_m = [
-        simulate("mu_jump", name, "sedan", SENSORS | changes, driver="novice").metrics["track_deviation_max_m"]
-        for name in ("none", controller)
-    ]
-    assert errors_m[1] < errors_m[0] + 0.1
-
-
 @pytest.mark.parametrize(
     ("controller", "changes", "told"),
     [
