@@ -94,6 +94,25 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
 
 
 @pytest.mark.slow
+def test_numbers_at_the_curves_belong_to_the_time_that_stands(browser: Browser, served: tuple[str, Path]) -> None:
+    page, problems = opened(browser, served[0] + "#maneuver=step_steer&controllers=none,ars")
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    page.click("#play")
+    page.locator("#time").fill("1.85")
+    page.click("#controllers input[value=afs]")
+    page.wait_for_selector("#command:has-text('-c afs')", timeout=LIMIT_MS)
+    page.wait_for_timeout(300)
+    times = page.evaluate(
+        "[...document.querySelectorAll('#curves p .quiet')].map((read) => read.textContent.slice(0, 6))"
+    )
+    assert set(times) == {"1.85 s"}
+    places = page.evaluate("[...activesteer.runs.values()].map((run) => [run.name, run.place])")
+    assert places == [["none", 0], ["ars", 1], ["afs", 2]]
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
 def test_without_webgl_the_page_shows_its_curves(browser: Browser, served: tuple[str, Path]) -> None:
     page = browser.new_page()
     page.add_init_script("""const of = HTMLCanvasElement.prototype.getContext;

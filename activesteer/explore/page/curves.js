@@ -85,7 +85,12 @@ export class Curves {
   panel(title, panel, lines, data) {
     const key = JSON.stringify(lines);
     let shown = this.plots.get(title);
-    if (shown && shown.key === key) { shown.plot.setData(data); return; }
+    const zoomed = shown && zoomOf(shown.plot);
+    if (shown && shown.key === key) {
+      shown.plot.setData(data);
+      if (zoomed) shown.plot.setScale("x", zoomed);
+      return;
+    }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
       const figure = element("div", {}, element("p", {}, element("b", {}, title), element("span", { class: "unit" }, [panel.unit, panel.note].filter(Boolean).join(", ")), values), holder);
@@ -98,7 +103,7 @@ export class Curves {
     const axis = (size, unit = "") => ({ values: (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit)), stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
     shown.plot = new uPlot({
       width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
-      cursor: { y: false, sync: { key: "explore" }, drag: { x: false, y: false } },
+      cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [axis(26, " s"), axis(44)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), auto: !line.ghost, width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
@@ -108,7 +113,16 @@ export class Curves {
         if (i != null && u.cursor.event && !this.marking) this.pointed(this.time = u.data[0][i]);
       }] },
     }, data, shown.holder);
+    if (zoomed) shown.plot.setScale("x", zoomed);
   }
+
+  // Show the whole run again.
+  whole() { for (const { plot } of this.plots.values()) plot.setData(plot.data); }
+}
+
+// The times that a plot shows, or null if it shows all.
+function zoomOf({ data: [time], scales: { x: { min, max } } }) {
+  return min > time[0] || max < time.at(-1) ? { min, max } : null;
 }
 
 // Values of a run at other instants.

@@ -40,6 +40,7 @@ function describe(ticked) {
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
   if (ticked) state.wanted = state.values;
+  else curves.whole();
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
@@ -185,7 +186,7 @@ const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
 function showColours() {
   for (const [name, swatch] of swatches) {
     const run = state.runs.get(name);
-    swatch.hidden = !run;
+    swatch.style.visibility = run ? "visible" : "hidden"; // its place stays, so that nothing moves
     if (run) swatch.setAttribute("style", `background:${runColour(run.place)}`);
   }
   $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
@@ -200,9 +201,9 @@ function showTitle(title) {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change" : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
-    const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.get(run.name));
+    const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
     return element("td", {}, number(now?.value, now?.digits), element("span", {}, Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
   })));
