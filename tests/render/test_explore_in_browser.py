@@ -220,6 +220,8 @@ def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, serv
     thumbs.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [left, right]})
     page.wait_for_timeout(1500)
     thumbs.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    page.tap("#switch button:has-text('afs')")
+    page.wait_for_selector("#switch button[aria-pressed=true]:has-text('afs')", timeout=LIMIT_MS)
     page.tap("#end")
     page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
     file = page.inner_text("#driven").partition("Saved as ")[2]

@@ -36,6 +36,8 @@ export class Drive {
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
+    $("switch").replaceChildren(...SWITCH.map((name) => element("button", { type: "button" }, name)));
+    $("switch").addEventListener("click", ({ target }) => { if (SWITCH.includes(target.textContent)) this.control(target.textContent); });
     const pad = $("touch-steer");
     if (matchMedia("(pointer: coarse)").matches) pad.prepend($("wheel"));
     const slide = (event) => {
@@ -156,12 +158,19 @@ export class Drive {
     if (down && event.key === "Escape") { this.end(); return; }
     if (down && event.key.toLowerCase() === "r") { this.prepare(); return; } // also the way back from off the course
     const place = Number(event.key) - 1;
-    if (down && SWITCH[place]) { $("drive-controller").value = SWITCH[place]; this.values(); this.act({ controller: SWITCH[place] }); return; }
+    if (down && SWITCH[place]) { this.control(SWITCH[place]); return; }
     const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!what) return;
     event.preventDefault();
     if (down) this.pressed.add(what); else this.pressed.delete(what);
     this.hands();
+  }
+
+  // Another controller takes over.
+  control(name) {
+    $("drive-controller").value = name;
+    this.values();
+    this.act({ controller: name });
   }
 
   pad() {
@@ -228,6 +237,7 @@ export class Drive {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
+    for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
     $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "";
