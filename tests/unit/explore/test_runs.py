@@ -16,6 +16,8 @@ from activesteer.explore.runs import Runs
 from activesteer.resources import find_maneuver, list_maneuvers
 
 OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
+SEARCHING = ("brake_in_turn", "fishhook", "sine_with_dwell", "step_steer", "split_mu_braking")
+"""A manoeuvre of each kind with a search, and one on a road of two sides."""
 CHOICE: dict[str, Any] = {"maneuver": "step_steer", "controllers": ("none", "ars")}
 
 
@@ -47,7 +49,10 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
     assert ["amplitude as before" in title for title in titles] == [False, True, False]
 
 
-@pytest.mark.parametrize("maneuver", list_maneuvers())
+@pytest.mark.parametrize(
+    "maneuver",
+    [pytest.param(name, marks=[] if name in SEARCHING else pytest.mark.slow) for name in list_maneuvers()],
+)
 def test_every_manoeuvre_starts_and_holds_what_its_search_found_while_a_slider_moves(maneuver: str, tmp_path: Path):
     runs = Runs(Folder(tmp_path))
     sliders = {slider["key"]: slider for slider in runs.describe(Describe(maneuver=maneuver)).header["sliders"]}
