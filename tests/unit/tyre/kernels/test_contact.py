@@ -262,6 +262,26 @@ def test_the_damper_acts_in_full_under_load() -> None:
     assert closing.fz_N - still.fz_N == pytest.approx(0.5 * tyre()["VERTICAL_DAMPING"])
 
 
+@pytest.mark.parametrize("heading", [0.4, -1.2, 2.5])
+def test_the_heading_of_a_cambered_wheel_turns_its_contact_point_and_changes_no_force(heading: float) -> None:
+    def rolling(heading: float) -> WheelForces:
+        camber, spin_radps, course = 0.08, 70.0, heading + 0.05
+        axis = -math.sin(heading) * math.cos(camber), math.cos(heading) * math.cos(camber), math.sin(camber)
+        velocity = {"velocity_x_mps": 20.0 * math.cos(course), "velocity_y_mps": 20.0 * math.sin(course)}
+        turning = {f"axis_{name}": part for name, part in zip("xyz", axis, strict=True)}
+        turning |= {f"spin_{name}_radps": spin_radps * part for name, part in zip("xyz", axis, strict=True)}
+        return _contact(deflection_x_m=0.002, deflection_y_m=0.004, **velocity, **turning)
+
+    ahead, turned = rolling(0.0), rolling(heading)
+    cos, sin = math.cos(heading), math.sin(heading)
+    assert (turned.arm_x_m, turned.arm_y_m) == pytest.approx(
+        (cos * ahead.arm_x_m - sin * ahead.arm_y_m, sin * ahead.arm_x_m + cos * ahead.arm_y_m), abs=1e-12
+    )
+    assert (turned.heading_x, turned.heading_y) == pytest.approx((cos, sin), abs=1e-12)
+    for name in ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm"):
+        assert getattr(turned, name) == pytest.approx(getattr(ahead, name), rel=1e-9)
+
+
 def test_speed_lifts_the_tyre_as_its_radius_grows() -> None:
     slow, fast = (_contact(velocity_x_mps=v, spin_y_radps=v / 0.3) for v in (5.0, 60.0))
     growth = tyre()["UNLOADED_RADIUS"] * tyre()["Q_V1"] * (200.0 * tyre()["UNLOADED_RADIUS"] / tyre()["LONGVL"]) ** 2
