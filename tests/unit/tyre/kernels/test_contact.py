@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.tyre.kernels.contact import WheelForces, tyre_on_road
+from activesteer.tyre.kernels.magic_formula import steady_state
 from activesteer.tyre.kernels.slip import carcass_stiffnesses
 from activesteer.tyre.kernels.vertical import free_radius
 from tests.tyre_rig import Motion, RigForces, TyreRig
@@ -220,6 +221,11 @@ def test_a_stop_and_a_reversal_are_smooth() -> None:
     assert jump_coarse < 30.0
     assert jump_fine < 0.7 * jump_coarse
     assert fine.force_N[1::2][:900] == pytest.approx(coarse.force_N[:900], abs=30.0)
+
+
+def test_a_tyre_without_load_has_neither_forces_nor_stiffness_nor_friction() -> None:
+    for load_N in (0.0, -10.0):
+        assert set(steady_state(_record(), load_N, 0.1, 0.05, 0.02, 230e3, 20.0, 1.0, 0.0)) == {0.0}
 
 
 def test_a_lifted_tyre_has_no_forces_and_forgets_its_deflection() -> None:
