@@ -50,7 +50,7 @@ class Link(Protocol):
     report: dict[str, int]
 
     def connect(self, check: Callable[[Given, str], Given]) -> None:
-        """Take the check of commands, which completes them and raises an error that says who gave a wrong one."""
+        """Receive the function that checks and completes commands, and whose errors name their giver."""
 
     def commands(self) -> Given:
         """Return the commands for the next step, or None where the run's own block decides."""
