@@ -186,8 +186,7 @@ const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
 function showColours() {
   for (const [name, swatch] of swatches) {
     const run = state.runs.get(name);
-    swatch.style.visibility = run ? "visible" : "hidden"; // its place stays, so that nothing moves
-    if (run) swatch.setAttribute("style", `background:${runColour(run.place)}`);
+    swatch.setAttribute("style", run ? `background:${runColour(run.place)}` : "visibility:hidden"); // its place stays
   }
   $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
 }
