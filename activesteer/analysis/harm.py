@@ -55,6 +55,7 @@ def is_lost(metrics: Metrics) -> bool:
 
 def is_controlled(metrics: Metrics) -> bool:
     """Return whether no metric tells that the car was lost."""
+    # Some manoeuvres have no metric that could.
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
     return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
 

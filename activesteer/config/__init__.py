@@ -339,10 +339,20 @@ def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: 
             fields = fields_of(owner)
             values = {name: field.default for name, field in fields.items()}
             values |= {field_in_unit(key, fields)[0]: value for key, value in within.items()}
-            rule = getattr(owner, "OVERRULED", {}).get(field_in_unit(path[-1], fields)[0])
-            if rule and all(_holds(values[other], wanted) for other, wanted in rule.items()):
+            if rule := _overruling(owner, path[-1], values):
                 by = " and ".join(f"{other} = {shown(values[other])}" for other in rule)
                 raise source.fail(path, f"has no effect beside {by}; leave one out", within.get(path[-1]))
+
+
+def is_overruled(owner: Any, key: str) -> bool:
+    """Return whether other values of an object make one of its keys ineffective (see `OVERRULED`)."""
+    return bool(_overruling(type(owner), key, vars(owner)))
+
+
+def _overruling(owner: type, key: str, values: Mapping[Any, Any]) -> Mapping[str, Any]:
+    """Return the rule that makes a key ineffective, or an empty one."""
+    rule = getattr(owner, "OVERRULED", {}).get(field_in_unit(key, fields_of(owner))[0], {})
+    return rule if all(_holds(values[other], wanted) for other, wanted in rule.items()) else {}
 
 
 def _holds(value: object, wanted: object) -> bool:

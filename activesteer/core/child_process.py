@@ -102,6 +102,7 @@ class Child:
 
 def _left_s(end_s: float) -> float:
     """Return the time until a deadline, or raise `TimeoutError` if it has passed."""
+    # A socket takes no negative timeout, and 0 makes it non-blocking.
     if (left_s := end_s - time.monotonic()) <= 0.0:
         raise TimeoutError
     return left_s

@@ -20,7 +20,7 @@ from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.run_page import write_report
-from activesteer.config import field_in_unit, leaves, spellings
+from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
@@ -105,9 +105,8 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
     for key, (low, high, step) in ranges.items():
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
-            # A manoeuvre that begins at rest has its speeds in its phases, and a road of two sides its friction there.
-            elsewhere = key == "road.mu" and value_of(scenario, "road.mu_left") is not None
-            if _is_number(value) and not elsewhere and not (key == "speed_kmh" and value == 0.0):
+            # A manoeuvre that begins at rest has its speeds in its phases.
+            if _moves(scenario, key, value) and not (key == "speed_kmh" and value == 0.0):
                 yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
@@ -120,11 +119,17 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
             continue
         with suppress(ParameterError):  # such as the keys of a table that is read from another file
             value = value_of(scenario, key)
-            if isinstance(value, float) and value > 0.0:
+            if _moves(scenario, key, value) and value > 0.0:
                 label, unit = parameter_label(key)
                 high = 1.0 if not unit and value <= 1.0 else 2.0 * value
                 digits = 4 - math.floor(math.log10(high))
                 yield Slider(key, label, unit, group, 0.5 * value, high, round(high / _STEPS, digits), value)
+
+
+def _moves(scenario: Scenario, key: str, value: Any) -> bool:
+    """Return whether a slider of a key with a value does anything: `road.mu` does not on a road of two sides."""
+    owner, _, name = key.rpartition(".")
+    return _is_number(value) and not (owner and is_overruled(value_of(scenario, owner), name))
 
 
 def _is_number(value: Any) -> bool:
@@ -235,7 +240,7 @@ class Runs:
         self._kept, self._choice = {}, (choice, overrides)
         for name in choice.controllers:
             look = looks[name]
-            run = {"kind": "run", "name": name, "label": look.label, "place": look.place, "dashes": look.dashes}
+            run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes}
             run["title"] = (scenario.maneuver.title or choice.maneuver) + held
             try:
                 controller = controller_spec(self.folder.located(name))

@@ -28,7 +28,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK
+from activesteer.core.conventions import RUN_COLOURS, RUN_COLOURS_ON_DARK, SYSTEM_LABELS
 from activesteer.core.files import finite
 from activesteer.core.version import __version__
 from activesteer.errors import ActiveSteerError
@@ -127,11 +127,12 @@ class ExploreServer:
 
     async def _index(self, _request: Request) -> Response:
         text = (resources.files("activesteer.explore") / "page" / "index.html").read_text("utf-8")
-        colours = {
+        known = {
             "light": RUN_COLOURS, "dark": RUN_COLOURS_ON_DARK, "version": __version__,
-            "mostControllers": MAX_CONTROLLERS, "courses": {name: course._asdict() for name, course in COURSES.items()},
+            "systems": list(SYSTEM_LABELS), "mostControllers": MAX_CONTROLLERS,
+            "courses": {name: course._asdict() for name, course in COURSES.items()},
         }  # fmt: skip
-        text = text.replace("{{ data }}", json.dumps(colours).replace("<", "\\u003c"))
+        text = text.replace("{{ data }}", json.dumps(known).replace("<", "\\u003c"))
         return HTMLResponse(text, headers={"Content-Security-Policy": _POLICY.format(host=self._host)})
 
     async def _file(self, request: Request) -> Response:

@@ -178,6 +178,7 @@ class Phases(Maneuver, kind="phases"):
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Setpoint of phases that end only by their times and inputs."""
+        # A run uses `sequence`, which sees the car.
         sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
             setpoint = sequence.setpoint(time_s, never)

@@ -38,6 +38,7 @@ class StepInput:
 
     def __post_init__(self) -> None:
         """Check that amplitude or lateral acceleration is given."""
+        # With both, a search has found the amplitude.
         if self.steering_wheel_rad is None and self.lateral_acceleration_mps2 is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or lateral_acceleration_g (which the car without control reaches) "
@@ -294,6 +295,7 @@ class DwellInput:
 
     def __post_init__(self) -> None:
         """Check that amplitude or factor is given."""
+        # With both, a search has found the amplitude.
         if self.steering_wheel_rad is None and self.amplitude_factor is None:
             raise ManeuverError(
                 "steering_wheel_deg (the amplitude) or amplitude_factor (the amplitude as a multiple of the steering "

@@ -336,6 +336,7 @@ class WheelSet:
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
         """Return the rolling radii under the current loads."""
+        # While sensors are fitted, the car stands still.
         loads_N = fb.wheel_outputs(self._data, len(CORNERS))["fz_N"]
         return [
             float(MagicFormula(tyre).evaluate(load_N, 0.0, 0.0, vx_mps=_CALIBRATED_AT_MPS).effective_radius_m)

@@ -84,6 +84,9 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
     page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
     page.click("#start:has-text('Drive at 60 km/h')", timeout=LIMIT_MS)
     page.wait_for_selector("#again:visible", timeout=LIMIT_MS)
+    said = "(header) => { activesteerDrive.gauges(header); return document.getElementById('again').textContent; }"
+    for seen, words in (({"missed": True}, "Gate missed: restart"), ({"last_lap_s": 9.0}, "Finished: restart")):
+        assert page.evaluate(said, {"steering_wheel_deg": 0.0, **seen}) == words
     page.keyboard.press("Escape")
     page.wait_for_selector("#driven:has-text('drive_plane_2.mcap')", timeout=LIMIT_MS)
     recording = activesteer.Recording.open(served[1] / "drive_plane.mcap")

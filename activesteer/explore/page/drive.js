@@ -23,7 +23,7 @@ export class Drive {
     $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => option(name, title)));
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
-    $("drive-controller").addEventListener("change", () => { this.values(); if (!this.act({ controller: $("drive-controller").value })) this.prepare(); });
+    $("drive-controller").addEventListener("change", () => this.control($("drive-controller").value));
     for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); }]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
       $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
@@ -166,11 +166,11 @@ export class Drive {
     this.hands();
   }
 
-  // Another controller takes over.
+  // Another controller takes over, at the start with a new car.
   control(name) {
     $("drive-controller").value = name;
     this.values();
-    this.act({ controller: name });
+    if (!this.act({ controller: name })) this.prepare();
   }
 
   pad() {

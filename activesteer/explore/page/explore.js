@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme, small } from "./look.js";
+import { colourCount, dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -26,7 +26,7 @@ const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
-const SYSTEMS = ["none", "ars", "afs"], places = new Map(); // name of a controller -> place of its colour
+const places = new Map(); // name of a controller -> place of its colour
 const swatches = new Map(); // name of a controller -> its colour beside its box
 const boxes = () => [...$("controllers").querySelectorAll("input")];
 const chosen = () => boxes().filter((box) => box.checked).map((box) => box.value);
@@ -173,9 +173,10 @@ function redraw() {
 
 // A controller keeps its colour when another one is ticked. The three systems always have theirs.
 function placeOf({ name, place }) {
-  const others = chosen().filter((other) => other !== name).map((other) => SYSTEMS.includes(other) ? SYSTEMS.indexOf(other) : places.get(other));
-  const free = [places.get(name), place, 3, 4, 5, 0, 1, 2].find((one) => one != null && !others.includes(one));
-  places.set(name, SYSTEMS.includes(name) ? place : free);
+  if (systems.includes(name)) return place;
+  const taken = chosen().filter((other) => other !== name).map((other) => (systems.includes(other) ? systems.indexOf(other) : places.get(other)));
+  const spare = Array.from({ length: colourCount }, (_, i) => (i + systems.length) % colourCount); // the systems' own colours last
+  places.set(name, [places.get(name), place, ...spare].find((one) => one != null && !taken.includes(one)));
   return places.get(name);
 }
 

@@ -3,11 +3,12 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const root = document.documentElement;
 const watchers = [];
 
-export const courses = data.courses, mostControllers = data.mostControllers;
+export const { courses, mostControllers, systems } = data;
 export const small = matchMedia("(max-width: 760px), (max-height: 450px)"); // a telephone, upright or on its side
 export const onTheme = (watcher) => watchers.push(watcher);
 export const dark = () => root.classList.contains("dark");
 export const paint = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+export const colourCount = data.light.length;
 export const runColour = (place) => (dark() ? data.dark : data.light)[place];
 
 // How slippery a road looks: 0 for dry asphalt to 1 for packed snow.

@@ -25,7 +25,7 @@ export class Track { show() {} at() {} }
 export class Scene { cars = new Map(); setShape() {} draw() {} follow() {} }
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} }
 export const small = { matches: false, addEventListener() {} };
-export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4;
+export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
