@@ -65,7 +65,7 @@ def draw_explore(browser: Browser, folder: Path) -> Image.Image:
         assert server.stdout is not None
         shown = browser.new_page(viewport={"width": 1200, "height": 1000})
         shown.goto(json.loads(server.stdout.readline())["url"])
-        shown.wait_for_selector("#state:has-text('all after')", timeout=60_000)
+        shown.wait_for_selector("#state:has-text('driven in')", timeout=60_000)
         shown.locator("#time").fill("2.6")
         shown.locator("#time").blur()
         shown.wait_for_timeout(3000)

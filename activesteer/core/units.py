@@ -237,6 +237,7 @@ _QUANTITIES: Final = {
         _row("yaw_rate_radps", "yaw rate", 1, 0.5),
         _row("yaw_rate_desired_radps", "desired yaw rate", 1, 0.5),
         _row("sideslip_rad", "sideslip angle", 1, 0.1, "sideslip"),
+        _row("slip_angle_rad", "slip angle", 1, 0.5),
         _row("ay_mps2", "lateral acceleration", 1, 0.2, "lateral acc."),
         _row("roll_rad", "roll angle", 1, 0.1),
         _row("ax_mps2", "longitudinal acceleration", 1, 0.2, "longitudinal acc."),

@@ -20,7 +20,12 @@ _OF_CORNERS: Final[dict[str, str]] = dict(zip(CORNERS, ("#56b4e9", "#e69f00", "#
 CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 _GREY: Final = "#a6a6a6"
 PATH_DISTANCE: Final = "path_distance_m"
-"""The only line that is not recorded: views that know the course derive it."""
+"""The only line that is not derived from recorded channels alone: views that know the course derive it."""
+AXLE_SLIP: Final = {
+    f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l_slip_angle_rad", f"{axle[0]}r_slip_angle_rad")
+    for axle in ("front", "rear")
+}
+"""Slip angle of an axle -> recorded slip angles of its wheels. The mean of both has no part of their toe angles."""
 
 
 class Channels(Protocol):
@@ -33,6 +38,9 @@ class Channels(Protocol):
 
 def drawn_values(recording: Channels, channel: str) -> Array:
     """Return a channel as a line shows it: the sideslip angle of a car that turns round continues beyond 180 deg."""
+    if channel in AXLE_SLIP:
+        left, right = (recording[wheel] for wheel in AXLE_SLIP[channel])
+        return 0.5 * (left + right)
     values = recording[channel]
     return np.unwrap(values) if channel.endswith("sideslip_rad") else values
 
@@ -120,6 +128,12 @@ PANELS: Final = {
     ),
     "sideslip": panel_of("sideslip_rad", _also(ESTIMATED, "sideslip_rad")),
     "lateral": panel_of("ay_mps2", _also(MEASURED, "ay_mps2")),
+    # The rear axle slips more in a car that spins, the front axle in one that pushes straight on.
+    "axle_slip": Panel(
+        "Slip angle of the axles", quantity_of("slip_angle_rad"),
+        (Line("rear_axle_slip_angle_rad", "rear axle"), Line("front_axle_slip_angle_rad", "front axle")),
+        "rear, dotted: front",
+    ),
     "added": Panel(
         "Added angle at the wheels", quantity_of("rear_steer_rad")._replace(short="added angle"),
         (
@@ -150,11 +164,13 @@ PANELS: Final = {
 VIEWS: Final = {
     FIGURE: ("steering_wheel", "yaw_rate", "added", "lateral", "sideslip", "roll", "speed"),
     REPORT: (
-        "steering_wheel", "yaw_rate", "sideslip", "lateral", "added", "path_distance", "roll", "speed",
+        "steering_wheel", "yaw_rate", "sideslip", "axle_slip", "lateral", "added", "path_distance", "roll", "speed",
         "sideslip_estimate", "speed_estimate", "yaw_rate_measured", "lateral_measured", "friction_utilisation",
         "wheel_load",
     ),
-    EXPLORE: ("steering_wheel", "yaw_rate", "sideslip", "lateral", "added", "path_distance", "roll", "speed"),
+    EXPLORE: (
+        "steering_wheel", "yaw_rate", "sideslip", "axle_slip", "lateral", "added", "path_distance", "roll", "speed",
+    ),
     FILM: ("speed", "sideslip", "added", "steering_wheel"),
     MOTION: ("yaw_rate", "sideslip", "added"),
     DRIVING: ("steering_wheel", "speed"),

@@ -26,7 +26,7 @@ from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
-from activesteer.drawing.cars import CHASSIS, dressed
+from activesteer.drawing.cars import CHASSIS, dressed, height_colours
 from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
@@ -35,6 +35,8 @@ from activesteer.plugins import Declared, Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
 from activesteer.road.course import Footprint
+from activesteer.road.drawn import surface_in
+from activesteer.road.road import road_of
 from activesteer.scenario import Scenario, resolve, value_of
 from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
@@ -192,6 +194,16 @@ def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
     return every * step_s, both.astype(np.float32)
 
 
+def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], ...]]:
+    """Return the height of the ground and, of an uneven road, corners [m], factors of their colours, and triangles."""
+    drawn = surface_in(recording.metadata)
+    if drawn is None:
+        return 0.0, ()
+    corners_m, triangles = drawn.mesh(road_of(recording.metadata))
+    factors = height_colours(corners_m[:, 2]) / height_colours(np.zeros(1))
+    return drawn.plane_below_m, (corners_m.astype(np.float32), factors.astype(np.float32), triangles.astype(np.float32))
+
+
 _CHUNK: Final = 500
 """Steps between two looks for a newer choice; about 10 ms."""
 
@@ -254,7 +266,11 @@ class Runs:
             step_s, poses = poses_of(recording)
             shown = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
             run["losses"] = list(losses(recording.metrics))
-            yield Reply({**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}, (poses,))
+            surface: tuple[NDArray[np.float32], ...] = ()
+            if len(self._kept) == 1 and not choice.dragging:  # all runs have the same road
+                run["ground_m"], surface = surface_of(recording)
+            shown_run = {**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}
+            yield Reply(shown_run, (poses, *surface))
         yield Reply({"kind": "finished", **self._commands(choice, overrides)})
 
     def save(self) -> Reply:

@@ -29,7 +29,7 @@ MAIN = "from activesteer.commands.cli import main; raise SystemExit(main())"
 COMMAND = [sys.executable, "-c", MAIN, "explore", "--json"]
 LAST_YAW_RATE = """() => [...activesteer.runs.values()].map((run) =>
   run.plots.panels.find((panel) => panel.title === "Yaw rate").series[0].values.at(-1))"""
-DONE = "#state:has-text('all after')"
+DONE = "#state:has-text('driven in')"
 LIMIT_MS = 60_000
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -269,5 +269,29 @@ def test_an_address_names_files_of_the_folder(browser: Browser, served: tuple[st
     page.click("#tab-drive")
     page.select_option("#drive-controller", "own_controller.py:YawDamper")
     page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_an_address_names_a_drive_whose_start_a_restart_brings_back(browser: Browser, served: tuple[str, Path]) -> None:
+    address = "#drive=plane&vehicle=sedan&controller=ars&speed_kmh=50&mu=0.5"
+    page, problems = opened(browser, served[0] + address, viewport={"width": 1000, "height": 600})
+    page.click("#start:has-text('Drive at 50 km/h')", timeout=LIMIT_MS)
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    assert page.input_value("#drive-vehicle") == "sedan"
+    assert page.input_value("#drive-controller") == "ars"
+    page.locator("#drive-mu").fill("0.8")  # during the drive
+    page.keyboard.press("r")
+    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    assert page.input_value("#drive-mu") == "0.5"
+    assert page.evaluate("activesteerDrive.ghosts.size") == 0  # a drive on another friction is nothing to beat
+    page.click("#start")
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    assert page.url.endswith(address)
+    page.click("#tab-explore")
+    page.wait_for_selector("#message:has-text('The drive has ended. It is saved as drive_plane')", timeout=LIMIT_MS)
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert "#maneuver=" in page.url
     assert problems == []
     page.close()

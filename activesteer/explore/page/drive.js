@@ -1,5 +1,5 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, inWords, number, option, small } from "./look.js";
+import { courses, element, inWords, number, offer, option, small } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
@@ -24,9 +24,9 @@ export class Drive {
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
     $("drive-controller").addEventListener("change", () => this.control($("drive-controller").value));
-    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); }]]) {
+    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); this.compared = false; }]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
-      $(id).addEventListener("change", () => { if (!this.running) { this.start_kmh = +$("drive-speed").value; this.prepare(); } });
+      $(id).addEventListener("change", () => { if (!this.running) { this.startAt(+$("drive-speed").value, +$("drive-mu").value); this.prepare(); } });
     }
     for (const [id, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]]) $("drive-speed").addEventListener(id, () => { this.held = held; });
     $("hold").addEventListener("change", () => this.hold());
@@ -54,16 +54,22 @@ export class Drive {
     }
     small.addEventListener("change", () => this.fold());
     this.fold();
-    this.ofCourse();
     window.activesteerDrive = this; // for tests and the curious
   }
 
   offer(names) {
     $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => option(name)));
     $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name]}` : name)));
-    $("drive-vehicle").value = "compact";
-    $("drive-controller").value = "none";
-    this.values();
+    this.choose({});
+  }
+
+  // Choose what the address names: #drive=lane_change&vehicle=sedan&controller=ars&speed_kmh=60&mu=0.5
+  choose({ drive, vehicle = "compact", controller = "none", speed_kmh, mu }) {
+    if (courses[drive]) $("course").value = drive;
+    this.ofCourse();
+    for (const [id, name] of [["drive-vehicle", vehicle], ["drive-controller", controller]]) offer($(id), name);
+    const inside = (id, value) => (Number.isFinite(+value) ? Math.min(+$(id).max, Math.max(+$(id).min, +value)) : +$(id).value);
+    this.startAt(inside("drive-speed", speed_kmh), inside("drive-mu", mu));
   }
 
   // On a small screen, the choices fold away while the car drives; a short one has no room for them before.
@@ -80,13 +86,22 @@ export class Drive {
     else this.end();
   }
 
-  settings() { return JSON.stringify([...["course", "drive-vehicle", "drive-controller", "drive-mu"].map((id) => $(id).value), this.start_kmh]); }
+  get address() {
+    return new URLSearchParams({ drive: $("course").value, vehicle: $("drive-vehicle").value, controller: $("drive-controller").value, speed_kmh: this.start_kmh, mu: this.start_mu });
+  }
 
   // Speed and friction of the course, until they are moved.
   ofCourse() {
     const course = courses[$("course").value];
-    $("drive-speed").value = this.start_kmh = course.speed_kmh;
-    $("drive-mu").value = course.mu;
+    this.startAt(course.speed_kmh, course.mu);
+  }
+
+  // Speed and friction at the start, to which a restart returns.
+  startAt(speed_kmh, mu) {
+    this.start_kmh = speed_kmh;
+    this.start_mu = mu;
+    $("drive-speed").value = speed_kmh;
+    $("drive-mu").value = mu;
     this.values();
   }
 
@@ -99,13 +114,13 @@ export class Drive {
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
-    $("drive-speed").value = this.start_kmh; // the pedals may have moved it
-    this.values();
+    this.startAt(this.start_kmh, this.start_mu); // they may have moved during the drive
+    history.replaceState(null, "", `#${this.address}`);
     this.ready = false;
     $("driven").textContent = ""; // of the last drive, perhaps of another course
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
-    this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: this.start_kmh, mu: +$("drive-mu").value });
+    this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: this.start_kmh, mu: this.start_mu });
   }
 
   failed() { $("start").textContent = "Cannot drive: choose another control or car"; }
@@ -114,7 +129,7 @@ export class Drive {
     if (header.id !== this.asked) return;
     this.ready = true;
     // Only drives of the same course with the same car, control, speed and friction can be compared.
-    this.setting = this.settings();
+    this.setting = String(this.address);
     this.timed = header.cones.length > 0 || header.radius_m > 0;
     this.rounds = header.radius_m > 0;
     this.way = this.rounds ? "Last lap" : "First to last gate";
@@ -133,7 +148,7 @@ export class Drive {
   }
 
   going() {
-    this.running = true;
+    this.running = this.compared = true;
     this.pressed.clear();  // a key that was let go after the last drive
     this.fold();
     this.latencies = [];
@@ -259,7 +274,7 @@ export class Drive {
     this.sent.clear();
     this.last = "";
     $("end").hidden = $("again").hidden = true;
-    const same = this.settings() === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
+    const same = this.compared && String(this.address) === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";
@@ -271,5 +286,6 @@ export class Drive {
     $("driven").replaceChildren(`${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${cones}`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     if (header.error) this.say(header.error);
+    else if (!this.shown) this.say(`The drive has ended. It is saved as ${header.file}.`, true);
   }
 }

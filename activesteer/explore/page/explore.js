@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { colourCount, dark, element, inWords, mostControllers, number, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
+import { colourCount, dark, element, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -54,20 +54,16 @@ function readAddress() {
   const names = wanted.controllers?.split(",") ?? FIRST.controllers;
   for (const name of names) if (!boxes().some((box) => box.value === name)) addBox(name);
   for (const box of boxes()) box.checked = names.includes(box.value);
-  state.wanted = wanted;
+  state.wanted = wanted.drive == null ? wanted : {};
   describe();
+  if (wanted.drive != null) { drive.choose(wanted); show("drive"); } else if (drive.shown) show("explore");
 }
 
 function writeAddress() {
+  if (drive.shown) return; // it has its own
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
   $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
-}
-
-// Choose a name in a list; the program answers a name that it does not know.
-function offer(list, name) {
-  if (![...list.options].some((option) => option.value === name)) list.append(option(name));
-  list.value = name;
 }
 
 function addBox(name) {
@@ -126,6 +122,7 @@ const hear = {
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) say(`${header.name}: ${header.error}`);
+    if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
     redraw();
   },
@@ -134,7 +131,7 @@ const hear = {
     if (header.id !== state.id) return;
     state.released = !state.dragged;
     state.all = performance.now() - state.asked;
-    $("state").textContent = `first curve after ${Math.round(state.first)} ms, all after ${Math.round(state.all)} ms`;
+    $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${/\d A\b/.test($("title").textContent) ? "; A: steering wheel angle at 0.3 g" : ""}`;
     $("command").textContent = header.command;
     $("python").textContent = header.python;
     asking.finished();
@@ -204,8 +201,8 @@ function showFigures() {
   const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
-    const change = now?.value != null && before?.value != null ? now.value - before.value : 0;
-    return element("td", {}, number(now?.value, now?.digits), element("span", {}, Math.abs(change) < 5e-4 ? "" : `${change > 0 ? "+" : ""}${number(change, now.digits)}`));
+    const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);
+    return element("td", {}, number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   if (runs.some((run) => run.losses.length)) rows.unshift(element("tr", {}, element("th", {}, "Fails"), ...runs.map((run) => element("td", {}, run.losses.join("; ")))));
   $("figures").replaceChildren(head, ...rows);
@@ -327,12 +324,14 @@ for (const what of ["command", "python"]) {
 }
 $("theme").addEventListener("click", () => setTheme(!dark()));
 onTheme(showFigures);
-for (const name of ["explore", "drive"]) {
-  $(`tab-${name}`).addEventListener("click", () => {
-    for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }
-    drive.show(name === "drive");
-    scene.fit();
-    if (name === "explore" && asking.busy) asking.ask(false);
-  });
+
+function show(name) {
+  for (const other of ["explore", "drive"]) { $(other).hidden = other !== name; $(`tab-${other}`).setAttribute("aria-selected", String(other === name)); }
+  drive.show(name === "drive");
+  scene.fit();
+  if (name === "drive") return;
+  if (asking.busy) asking.ask(false);
+  else writeAddress();
 }
+for (const name of ["explore", "drive"]) $(`tab-${name}`).addEventListener("click", () => show(name));
 requestAnimationFrame((now) => player.tick(now));

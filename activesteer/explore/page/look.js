@@ -31,4 +31,9 @@ export const element = (name, attributes = {}, ...children) => {
 // A name of the package in words; a file keeps its name.
 export const inWords = (name) => (name.includes(".") ? name : name.replaceAll("_", " "));
 export const option = (name, text = inWords(name)) => element("option", { value: name }, text);
+// Choose a name in a list; the program answers a name that it does not know.
+export function offer(list, name) {
+  if (![...list.options].some((option) => option.value === name)) list.append(option(name));
+  list.value = name;
+}
 export { number } from "./number.js";

@@ -57,6 +57,8 @@ export class Scene {
     this.cars = new Map();
     this.course = new THREE.Group();
     this.scene.add(this.course);
+    this.surface = null;
+    this.ground_m = 0;
     this.heading = null;
     onTheme(() => this.colours());
     this.colours();
@@ -163,7 +165,7 @@ export class Scene {
       if (part) body.quaternion.slerp(new THREE.Quaternion(poses[b + 4], poses[b + 5], poses[b + 6], poses[b + 3]), part);
     });
     const [{ position, quaternion: q }] = car.bodies;
-    car.shadow.position.set(position.x, position.y, 0);
+    car.shadow.position.set(position.x, position.y, this.surface ? position.z - poses[2] : 0);
     car.shadow.rotation.z = Math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z));
     this.stale = true;
   }
@@ -193,7 +195,7 @@ export class Scene {
     const car = this.cars.get(name), size = 7 * car.bodies.length, points = car.trail.geometry.getAttribute("position");
     const every = Math.max(1, Math.ceil(until / TRAIL_POINTS));
     car.points = 0;
-    for (let row = 0; row < until; row += every) points.setXYZ(car.points++, poses[row * size], poses[row * size + 1], 0.03);
+    for (let row = 0; row < until; row += every) points.setXYZ(car.points++, poses[row * size], poses[row * size + 1], 0.03 + (this.surface ? poses[row * size + 2] - poses[2] : 0));
     points.needsUpdate = true;
     car.trail.geometry.setDrawRange(0, car.points);
   }
@@ -202,6 +204,25 @@ export class Scene {
   tint(mu) {
     this.ground.material.color.setRGB(1, 1, 1).lerp(new THREE.Color(1.5, 1.75, 2.1), slippery(mu));
     this.stale = true;
+  }
+
+  // The surface of an uneven road: corners, factors of their colours by height, and triangles; of a plane road nothing.
+  // It writes no depth, because cars are drawn behind where they are.
+  setSurface([corners, factors, triangles], ground_m) {
+    this.ground_m = ground_m;
+    if (this.surface) { this.scene.remove(this.surface); this.surface.geometry.dispose(); this.surface.material.dispose(); }
+    this.surface = null;
+    this.stale = true;
+    if (!corners) return;
+    const geometry = new THREE.BufferGeometry(), of = (values, size) => new THREE.BufferAttribute(values, size);
+    geometry.setAttribute("position", of(corners.slice(), 3));
+    geometry.setAttribute("color", of(factors.slice(), 3));
+    geometry.setAttribute("uv", of(Float32Array.from({ length: corners.length / 3 * 2 }, (_, i) => corners[3 * (i >> 1) + i % 2] / ROAD_M + 0.5), 2));
+    geometry.setIndex(of(new Uint32Array(triangles), 1));
+    this.surface = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ map: this.asphalt, vertexColors: true, depthWrite: false }));
+    this.surface.renderOrder = -2.5;
+    this.surface.frustumCulled = false;
+    this.scene.add(this.surface);
   }
 
   setCourse({ cones, lanes, radius = 0, line = [], patches = [], mu = 0.9 }) {
@@ -268,7 +289,7 @@ export class Scene {
     const back = CAMERA_BACK + SPREAD_BACK * spread;
     this.camera.position.set(at.x - 1.3 - back * cos, at.y - back * sin, CAMERA_UP + SPREAD_UP * spread);
     this.camera.lookAt(at.x + AHEAD * cos, at.y + AHEAD * sin, 0.6);
-    this.ground.position.set(TILE_M * Math.round(at.x / TILE_M), TILE_M * Math.round(at.y / TILE_M), -0.02);
+    this.ground.position.set(TILE_M * Math.round(at.x / TILE_M), TILE_M * Math.round(at.y / TILE_M), this.ground_m - 0.02);
     this.stale = true;
   }
 

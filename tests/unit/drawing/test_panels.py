@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from activesteer import simulate
 from activesteer.core.conventions import CORNERS
 from activesteer.drawing import panels
 from activesteer.drawing.panels import (
+    AXLE_SLIP,
     PANELS,
     PATH_DISTANCE,
     VIEWS,
@@ -30,7 +32,7 @@ def test_every_channel_of_every_panel_is_recorded() -> None:
         for line in panel.lines:
             if line.channel == PATH_DISTANCE:
                 continue
-            wanted = {line.channel, line.demand, line.beside} - {""}
+            wanted = {*AXLE_SLIP.get(line.channel, (line.channel,)), line.demand, line.beside} - {""}
             # A car with sensors or an estimator records a true value under a second name.
             assert {each.removeprefix("measured_").removeprefix("estimated_") for each in wanted} <= recorded, name
 
@@ -65,6 +67,15 @@ def test_parts_of_all_corners_have_one_colour() -> None:
     assert len(by_corner) == len(CORNERS)
     assert {panel.lines[0].colour for panel in by_corner} == {by_corner[0].lines[0].colour}
     assert json.dumps([panel.title_with_unit for panel in by_corner]).count("[N]") == len(CORNERS)
+
+
+@pytest.mark.parametrize(("maneuver", "spins"), [("sine_with_dwell", True), ("ramp_steer", False)])
+def test_the_axle_that_has_lost_its_grip_slips_more(maneuver: str, spins: bool) -> None:
+    """At 4 s, the sine with dwell has ended with a car that spins, and the ramp has asked for too much of the front."""
+    run = simulate(maneuver, "none")
+    rear, front = (np.degrees(drawn_values(run, f"{axle}_axle_slip_angle_rad")[4000]) for axle in ("rear", "front"))
+    # Without steering, the slip angles of the axles differ by wheelbase times yaw rate over speed, here 6 deg.
+    assert abs(rear) > abs(front) + 4.0 if spins else abs(front) > 2.0 * abs(rear)
 
 
 def test_the_sideslip_angle_of_a_car_that_turns_round_has_no_jump() -> None:

@@ -22,8 +22,8 @@ export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
 export class Curves { show() {} at() {} whole() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); setShape() {} draw() {} follow() {} }
-export class Drive { offer() {} going() {} failed() {} draw() {} show() {} }
+export class Scene { cars = new Map(); setShape() {} setSurface() {} draw() {} follow() {} }
+export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };
 export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
 export const element = (name, attributes = {}, ...children) => {
@@ -32,6 +32,7 @@ export const element = (name, attributes = {}, ...children) => {
   made.append(...children);
   return made;
 };
+export const offer = (list, name) => { list.value = name; };
 export const inWords = (name) => name, option = (name) => element("option", { value: name });
 export { number } from "./number.mjs";
 

@@ -12,7 +12,7 @@ import pytest
 import activesteer
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
-from activesteer.explore.runs import Runs
+from activesteer.explore.runs import Reply, Runs
 from activesteer.resources import find_maneuver, list_maneuvers
 
 OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
@@ -68,13 +68,36 @@ def test_every_manoeuvre_starts_and_holds_what_its_search_found_while_a_slider_m
 def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
     choice = RunRequest(maneuver="sine_with_dwell", controllers=("none", "ars"))
     lost, held, _ = (reply.header for reply in Runs(Folder(tmp_path)).run(choice, lambda: False))
-    assert lost["losses"] == ["lost at 45 deg of sideslip"]
+    assert lost["losses"] == ["lost: 45 deg of peak sideslip"]
     assert held["losses"] == []
 
 
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:
     looks = iter([False] * 3 + [True] * 10)
     assert list(Runs(Folder(tmp_path)).run(RunRequest(**CHOICE), lambda: next(looks))) == []
+
+
+def test_the_road_under_the_cars_is_the_one_that_they_drive_on(tmp_path: Path) -> None:
+    """The kerb of 60 mm, sent once: not with the second run, nor while a slider moves, nor for a plane road."""
+
+    def driven(dragging: bool, maneuver: str = "kerb_strike") -> list[Reply]:
+        choice = RunRequest(maneuver=maneuver, controllers=("none", "ars"), dragging=dragging)
+        return [reply for reply in Runs(Folder(tmp_path)).run(choice, lambda: False) if reply.header["kind"] == "run"]
+
+    first, second = driven(dragging=False)
+    _, corners_m, factors, triangles = first.arrays
+    assert corners_m[:, 2].min() == 0.0
+    assert corners_m[:, 2].max() == pytest.approx(0.06)
+    assert first.header["ground_m"] < 0.0
+    top = corners_m[:, 2] > 0.05
+    assert factors[~top & (corners_m[:, 2] == 0.0)] == pytest.approx(1.0)
+    assert (factors[top] > 1.1).any(axis=1).all()
+    assert triangles.max() == len(corners_m) - 1
+    assert "ground_m" not in second.header
+    assert len(second.arrays) == 1
+    assert "ground_m" not in driven(dragging=True)[0].header
+    plane = driven(False, "straight_line")[0]
+    assert (plane.header["ground_m"], len(plane.arrays)) == (0.0, 1)
 
 
 def test_the_shape_of_the_car_covers_its_length_and_stands_on_four_wheels(tmp_path: Path) -> None:
