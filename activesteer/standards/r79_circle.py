@@ -186,7 +186,9 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
     def tolerated(row: Mapping[str, Any]) -> str:
         return "always" if row["fault_tolerant_time_s"] is None else cell(row["fault_tolerant_time_s"], 3)
 
-    faults = sorted(faults, key=lambda row: not _has_effect(row))  # the others last
+    names = _with_effect(faults)
+    idle = dict.fromkeys(name for name in map(_named, faults) if name not in names)
+    faults = [row for row in faults if _named(row) in names]
     rows = [
         (
             _named(row), row["direction"], *(cell(_shown(row, name), 2) for name in FIGURES[:-1]),
@@ -194,6 +196,8 @@ def _fault_table(faults: list[dict[str, Any]]) -> Table:
         )
         for row in faults
     ]  # fmt: skip
+    if idle:  # in one row
+        rows.append((f"without effect: {', '.join(idle)}", "both", *[cell(0.0, 2)] * len(FIGURES[:-1]), "always"))
     columns = (
         "fault", "circle", "yaw rate, change, hands fixed [deg/s]", "lateral acceleration, change, hands fixed [m/s²]",
         "lateral offset after 1 s, hands fixed [m]", "lateral offset after 1 s, driver [m]",
