@@ -129,6 +129,7 @@ def test_an_input_out_of_range_is_evaluated_at_the_limit_and_says_so(compact: Ma
     outside = compact.evaluate(4000.0, 0.0, 2.0)
     assert outside.fy_N == compact.evaluate(4000.0, 0.0, parameters["ALPMAX"]).fy_N
     assert outside.saturated(Limit.SLIP_ANGLE)
+    assert compact.evaluate(4000.0, 0.0, [parameters["ALPMIN"], parameters["ALPMAX"]]).limits.tolist() == [0, 0]
     flags = compact.evaluate([50, 2e4, 4e3, 4e3, 4e3, 4e3], [0, 0, 9, 0, 0, 0], 0, [0, 0, 0, 1, 0, 0],
                              [2.3e5, 2.3e5, 2.3e5, 2.3e5, 9e5, 2.3e5]).limits  # fmt: skip
     assert flags.tolist() == [1, 2, 4, 16, 32, 0]
@@ -183,6 +184,23 @@ def test_road_friction_scales_the_peak_and_keeps_the_slope(compact: MagicFormula
         float(compact.evaluate(4000.0, 0.0, 0.0, road_friction=mu).cornering_stiffness_Nprad) for mu in (1.0, 0.4)
     ]
     assert stiffness[0] == stiffness[1]
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_the_factors_of_the_moments_scale_what_they_are_named_after(old: bool) -> None:
+    """Pacejka 2012, eq. 4.E69 and 4.E70: LVMX scales the offset QSX1, LMX and LMY whole moments."""
+    start = tyre("synthetic_all_terms").with_values(QSX1=0.02, LVMX=1.0, LMX=1.0, LMY=1.0)
+    start = start.with_values(FITTYP=6) if old else start
+
+    def moments(**changed: float) -> tuple[float, float]:
+        forces = MagicFormula(start.with_values(**changed)).evaluate(4000.0, 0.01, 0.03, 0.02)
+        return float(forces.mx_Nm), float(forces.my_Nm)
+
+    (mx_Nm, my_Nm), without, twice = moments(), moments(QSX1=0.0)[0], moments(LVMX=2.0)[0]
+    assert mx_Nm - without == pytest.approx(0.02 * start["UNLOADED_RADIUS"] * 4000.0)
+    assert twice - without == pytest.approx(2.0 * (mx_Nm - without))
+    assert moments(LMX=1.5)[0] == pytest.approx(1.5 * mx_Nm)
+    assert moments(LMY=1.5)[1] == pytest.approx(1.5 * my_Nm)
 
 
 def test_a_road_without_friction_gives_finite_forces(compact: MagicFormula) -> None:
