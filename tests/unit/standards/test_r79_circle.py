@@ -113,7 +113,7 @@ def test_the_compact_is_steered_alike_to_both_sides_and_corrected_in_both_circle
 
 
 def test_every_plot_of_the_faults_names_its_rows_and_no_dot_covers_another():
-    """A fault without effect has no row in the plots and shares the last one of the table; the summary counts such faults."""
+    """Faults without effect have no row in the plots and share the last one of the table; the summary counts them."""
     sizes = {"rear:offset=1deg": 0.1, "rear:stuck": 0.0, "yaw_rate_sensor:offset=2degps": -0.1}
     both = [(*item, side) for item in sizes.items() for side in ("left", "right")]
     faults = [dict.fromkeys(FIGURES, size) | {"fault": name, "direction": side} for name, size, side in both]
