@@ -47,6 +47,18 @@ def test_deflection_and_force_are_inverse(parameters, rng: np.random.Generator) 
         assert vertical_force_loaded(p, deflection, 40.0, 220e3, fx, fy, gamma) == pytest.approx(load, rel=1e-9)
 
 
+@pytest.mark.parametrize("version", [61, 62])
+def test_the_force_of_an_upright_tyre_is_that_of_the_equation_of_its_file(version: int) -> None:
+    """Besselink 2010, equation 2, and MF 6.2 manual: both formulas are the same without camber and lateral force."""
+    t = _mf62().with_values(FITTYP=version)
+    for deflection, spin, fx in ((0.02, 0.0, 0.0), (0.03, 60.0, 0.0), (0.025, 30.0, -2500.0)):
+        rho, fz0 = deflection / t["UNLOADED_RADIUS"], t["FNOMIN"]
+        soft = 1.0 + t["Q_V2"] * spin * t["UNLOADED_RADIUS"] / t["LONGVL"] - (t["Q_FCX"] * fx / fz0) ** 2
+        expected = soft * (t["Q_FZ1"] * rho + t["Q_FZ2"] * rho**2) * fz0
+        found = vertical_force_loaded(t.record, deflection, spin, t["NOMPRES"], fx, 0.0, 0.0)
+        assert found == pytest.approx(expected, rel=1e-9)
+
+
 def test_no_deflection_gives_no_force() -> None:
     assert vertical_force(tyre().record, 0.0, 50.0, 230e3) == 0.0
     assert vertical_force(tyre().record, -0.01, 50.0, 230e3) == 0.0
