@@ -21,11 +21,9 @@ CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left
 _GREY: Final = "#a6a6a6"
 PATH_DISTANCE: Final = "path_distance_m"
 """The only line that is not derived from recorded channels alone: views that know the course derive it."""
-AXLE_SLIP: Final = {
-    f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l_slip_angle_rad", f"{axle[0]}r_slip_angle_rad")
-    for axle in ("front", "rear")
-}
-"""Slip angle of an axle -> recorded slip angles of its wheels. The mean of both has no part of their toe angles."""
+AXLE_SLIP: Final = {f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l", f"{axle[0]}r") for axle in ("front", "rear")}
+"""Slip angle of an axle -> its wheels. It is their mean by wheel load, so that a lifted wheel has no part."""
+_LEAST_LOAD_N: Final = 1.0
 
 
 class Channels(Protocol):
@@ -39,8 +37,10 @@ class Channels(Protocol):
 def drawn_values(recording: Channels, channel: str) -> Array:
     """Return a channel as a line shows it: the sideslip angle of a car that turns round continues beyond 180 deg."""
     if channel in AXLE_SLIP:
-        left, right = (recording[wheel] for wheel in AXLE_SLIP[channel])
-        return 0.5 * (left + right)
+        slips, loads = (
+            [recording[f"{wheel}_{what}"] for wheel in AXLE_SLIP[channel]] for what in ("slip_angle_rad", "tyre_fz_N")
+        )
+        return np.average(slips, axis=0, weights=np.maximum(loads, _LEAST_LOAD_N))
     values = recording[channel]
     return np.unwrap(values) if channel.endswith("sideslip_rad") else values
 
@@ -128,7 +128,6 @@ PANELS: Final = {
     ),
     "sideslip": panel_of("sideslip_rad", _also(ESTIMATED, "sideslip_rad")),
     "lateral": panel_of("ay_mps2", _also(MEASURED, "ay_mps2")),
-    # The rear axle slips more in a car that spins, the front axle in one that pushes straight on.
     "axle_slip": Panel(
         "Slip angle of the axles", quantity_of("slip_angle_rad"),
         (Line("rear_axle_slip_angle_rad", "rear axle"), Line("front_axle_slip_angle_rad", "front axle")),
@@ -169,7 +168,8 @@ VIEWS: Final = {
         "wheel_load",
     ),
     EXPLORE: (
-        "steering_wheel", "yaw_rate", "sideslip", "axle_slip", "lateral", "added", "path_distance", "roll", "speed",
+        "steering_wheel", "yaw_rate", "sideslip", "axle_slip", "added", "lateral", "path_distance", "roll", "speed",
+        "wheel_load",
     ),
     FILM: ("speed", "sideslip", "added", "steering_wheel"),
     MOTION: ("yaw_rate", "sideslip", "added"),

@@ -237,6 +237,7 @@ class Runs:
                 "kind": "description",
                 "title": scenario.maneuver.title or choice.maneuver,
                 "sliders": [slider._asdict() for slider in self._sliders(choice)],
+                "steered": scenario.maneuver.course is None,
                 "shape": header,
             },
             tuple(arrays),
@@ -244,15 +245,18 @@ class Runs:
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
+        self._kept, self._choice = {}, None  # what fails from here on leaves nothing to save
         self.folder.check(choice)
         overrides = choice.values
         check_numbers(overrides, self._limits(choice))
         scenario, held = self._held(choice, self._resolved(choice, overrides))
         looks = run_looks(choice.controllers)
-        self._kept, self._choice = {}, (choice, overrides)
+        self._choice = choice, overrides
+        road = scenario.maneuver.road
+        mu = 0.0 if is_overruled(road, "mu") else road.mu
         for name in choice.controllers:
             look = looks[name]
-            run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes}
+            run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu or None}
             run["title"] = (scenario.maneuver.title or choice.maneuver) + held
             try:
                 controller = controller_spec(self.folder.located(name))
@@ -271,7 +275,7 @@ class Runs:
                 run["ground_m"], surface = surface_of(recording)
             shown_run = {**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}
             yield Reply(shown_run, (poses, *surface))
-        yield Reply({"kind": "finished", **self._commands(choice, overrides)})
+        yield Reply({"kind": "finished", **self._commands(choice, overrides, list(self._kept))})
 
     def save(self) -> Reply:
         """Write the last runs as recordings."""
@@ -334,10 +338,12 @@ class Runs:
             simulation.advance(min(_CHUNK, simulation.steps - round(simulation.time_s / 1e-3)))
         return simulation.recording()
 
-    def _commands(self, choice: Choice, overrides: Mapping[str, float]) -> dict[str, str]:
-        """Return the command line and the Python code that repeat the runs."""
+    def _commands(self, choice: Choice, overrides: Mapping[str, float], driven: Sequence[str]) -> dict[str, str]:
+        """Return the command line and the Python code that repeat the runs of some controllers."""
+        if not driven:
+            return {"command": "", "python": ""}
         words = ["activesteer", "run", choice.maneuver]
-        words += [word for name in choice.controllers for word in ("-c", name)]
+        words += [word for name in driven for word in ("-c", name)]
         words += ["--vehicle", choice.vehicle] if choice.vehicle != "compact" else []
         words += ["--driver", choice.driver] if choice.driver != DEFAULT_DRIVER else []
         words += [word for key, value in overrides.items() for word in ("--set", f"{key}={value:g}")]
@@ -347,7 +353,7 @@ class Runs:
             "driver": choice.driver if choice.driver != DEFAULT_DRIVER else None,
         }
         more = "".join(f", {key}={json.dumps(value)}" for key, value in given.items() if value is not None)
-        names = json.dumps(list(choice.controllers))
+        names = json.dumps(list(driven))
         python = f"runs = [activesteer.simulate({json.dumps(choice.maneuver)}, name{more}) for name in {names}]"
         return {"command": shlex.join(words), "python": python}
 
@@ -375,7 +381,8 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
             shown = size if math.isfinite(size) else None
-            # Times differ by milliseconds; other values have digits by their size.
-            digits = 0 if metric.whole else 3 if metric.unit_name == "s" else None
+            # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
+            fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
+            digits = 0 if metric.whole else 3 if fine else None
             found.append({"title": title, "unit": metric.unit_name, "value": shown, "digits": digits})
     return found

@@ -129,7 +129,8 @@ def _numbered(reply: Reply, number: int) -> Reply:
 
 
 def _error(error: BaseException, message: Message) -> Reply:
-    return Reply({"kind": "error", "text": _words(error), "about": type(message).__name__.lower()})
+    about = {"about": type(message).__struct_config__.tag, "id": getattr(message, "id", None)}
+    return Reply({"kind": "error", "text": _words(error), **about})
 
 
 def _words(error: BaseException) -> str:

@@ -28,6 +28,7 @@ from activesteer.config import (
 )
 from activesteer.config.faults import fault_table
 from activesteer.controllers import ControllerParameters, ControllerSetup
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.files import user_path
 from activesteer.driver import DriverParameters, DriverSetup
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, nearest_names
@@ -176,16 +177,32 @@ def resolve(
     built = build_maneuver(table, source)
     if is_recording(maneuver):
         built = build_maneuver(led(table, car.on(built.ground).steering_lag_s), source)
-    return Scenario(_with_speed_in_title(built, of_file), car, who, changes, made_from, own)
+    changed = [field_path(kind, override.path) for override in sorted_out["maneuver"]]
+    return Scenario(_with_changes_in_title(built, of_file, changed), car, who, changes, made_from, own)
 
 
-def _with_speed_in_title(built: Maneuver, of_file: Mapping[str, Any]) -> Maneuver:
-    """Return the manoeuvre with the driven speed in its title, if the title contains the speed of its file."""
-    said = f"{of_file.get('speed_kmh', math.nan):g} km/h"
-    driven = f"{3.6 * built.speed_mps:.4g} km/h"
-    if driven == said or built.title != of_file.get("title"):
+_IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
+    ("steer", "amplitude_factor"): (r"[\d.]+ A\b", "{:.3g} A", 1.0),
+    ("steer", "lateral_acceleration_mps2"): (r"[\d.]+ g\b", "{:.3g} g", GRAVITY_MPS2),
+    ("turn", "lateral_acceleration_mps2"): (r"[\d.]+ m/s²", "{:.3g} m/s²", 1.0),
+    ("cones", "spacing_m"): (r"[\d.]+ m\b", "{:.3g} m", 1.0),
+    ("road", "mu"): (r"\b(dry|slippery)\b", "friction {:.3g}", 1.0),
+}
+"""Field of a manoeuvre -> how titles of files say its value, what they say of another one, and the SI value of one."""
+
+
+def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:
+    """Return the manoeuvre with the driven values in its title, where the title of its file says them."""
+    title = built.title
+    if title != of_file.get("title"):
         return built
-    return replace(built, title=re.sub(rf"\b{said}", driven, built.title))
+    said = f"{of_file.get('speed_kmh', math.nan):g} km/h"
+    title = re.sub(rf"\b{said}", f"{3.6 * built.speed_mps:.4g} km/h", title)
+    for path in filter(_IN_TITLES.__contains__, changed):
+        pattern, words, size = _IN_TITLES[path]
+        if isinstance(value := functools.reduce(getattr, path, built), float):
+            title = re.sub(pattern, words.format(value / size), title, count=1)
+    return built if title == built.title else replace(built, title=title)
 
 
 def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequence[str]) -> None:

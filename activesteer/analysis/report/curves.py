@@ -35,12 +35,12 @@ DIGITS: Final = 4
 """Digits after the first digit of a signal's range. More cannot be seen."""
 
 
-def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[Array]:
-    """Yield the lines of a run: its own, then those that are dotted."""
+def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bool, Array]]:
+    """Yield the lines of a run, each with whether it is dotted: all but the first of the panel."""
     if panel.extreme is not None:
-        yield panel.extreme.reduce([recording[line.channel] for line in panel.lines])
+        yield False, panel.extreme.reduce([recording[line.channel] for line in panel.lines])
         return
-    for line in panel.lines_in(view):
+    for place, line in enumerate(panel.lines_in(view)):
         # A run of an older version or of another program may lack the signal.
         with suppress(RecordingError):
             if line.channel == PATH_DISTANCE:
@@ -49,7 +49,7 @@ def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[Array]:
             else:
                 values = line.of(recording)
             if values is not None:
-                yield values
+                yield place > 0, values
 
 
 def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
@@ -90,11 +90,10 @@ def _panel(panel: Panel, view: str, runs: Sequence[ReportedRun], grid: Array) ->
     series = []
     for number, run in enumerate(runs):
         with suppress(RecordingError):
-            for place, values in enumerate(_signals(panel, view, run.recording)):
+            for dotted, values in _signals(panel, view, run.recording):
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
-                # The only signal of a run is its own line; further signals are dotted.
-                series.append({"run": number, "dotted": place > 0, "values": _rounded(sampled)})
-    note = panel.note if any(item["dotted"] for item in series) else ""
+                series.append({"run": number, "dotted": dotted, "values": _rounded(sampled)})
+    note = panel.note if any(item["dotted"] for item in series) else panel.lines[0].name if not panel.extreme else ""
     shown = panel.quantity
     return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}
 

@@ -28,6 +28,8 @@ export class Curves {
 
   draw() {
     if (!this.runs) return;
+    for (const { plot, figure } of this.runs.size ? [] : this.plots.values()) { plot.destroy(); figure.remove(); }
+    if (!this.runs.size) this.plots.clear();
     const all = [...[...this.ghosts].map(([name, run]) => [name, run, true]), ...[...this.runs].map(([name, run]) => [name, run, false])].filter(([, run]) => run.plots);
     if (!all.length) return;
     const longest = all.reduce((a, b) => (a[1].plots.samples * a[1].plots.step_s >= b[1].plots.samples * b[1].plots.step_s ? a : b))[1].plots;
@@ -40,9 +42,9 @@ export class Curves {
       for (const [name, run, ghost] of all) {
         const panel = run.plots.panels.find((other) => other.title === title);
         if (!panel) continue;
-        panelOf = panel;
+        if (!panelOf || panel.note.length > panelOf.note.length) panelOf = panel;
         for (const series of panel.series) {
-          if (ghost && series.dotted) continue;
+          if (ghost && series.dotted && panel.series.length > 1) continue;
           lines.push({ name, ghost, place: run.place, dash: series.dotted ? [1.5, 3] : run.dashes.map((d) => 1.5 * d), dotted: series.dotted });
           data.push(on(time, run.plots, series.values));
         }
@@ -50,6 +52,12 @@ export class Curves {
       this.panel(title, panelOf, lines, data);
     }
     this.again();
+  }
+
+  // Let another part of the grid be as high as some rows of curves.
+  besides(part) {
+    const row = HEIGHT + 36, columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length;
+    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.ceil((part.firstElementChild.offsetHeight - 40) / row))}` : "";
   }
 
   // New curves have their scales in the next frame.
@@ -72,6 +80,7 @@ export class Curves {
     ctx.strokeStyle = ctx.fillStyle = paint("quiet");
     ctx.lineWidth = devicePixelRatio;
     ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
+    ctx.textAlign = "left";
     ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
     const first = u === this.plots.values().next().value?.plot;
     for (const { time_s, text } of marks) {
@@ -85,7 +94,8 @@ export class Curves {
   panel(title, panel, lines, data) {
     const key = JSON.stringify(lines);
     let shown = this.plots.get(title);
-    const zoomed = shown && zoomOf(shown.plot);
+    const zoomed = shown && zoomOf(shown.plot), unit = [panel.unit, panel.note].filter(Boolean).join(", ");
+    if (shown) shown.unit.textContent = unit;
     if (shown && shown.key === key) {
       shown.plot.setData(data);
       if (zoomed) shown.plot.setScale("x", zoomed);
@@ -93,9 +103,9 @@ export class Curves {
     }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
-      const figure = element("div", {}, element("p", {}, element("b", {}, title), element("span", { class: "unit" }, [panel.unit, panel.note].filter(Boolean).join(", ")), values), holder);
+      const said = element("span", { class: "unit" }, unit), figure = element("div", {}, element("p", {}, element("b", {}, title), said, values), holder);
       this.box.append(figure);
-      shown = { figure, holder, values };
+      shown = { figure, holder, values, unit: said };
       this.plots.set(title, shown);
       holder.addEventListener("mouseleave", () => this.again()); // back to the time of the pictures
     } else shown.plot.destroy();
@@ -105,7 +115,7 @@ export class Curves {
       width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
       cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
-      axes: [axis(26, " s"), axis(44)],
+      axes: [{ ...axis(30, " s"), gap: 8 }, axis(44)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), auto: !line.ghost, width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
       hooks: { drawAxes: [(u) => this.marks(u)], setCursor: [(u) => {
         const i = u.cursor.idx;
@@ -158,6 +168,11 @@ export class Track {
     pen.scale(scale, scale);
     const tracks = [...this.ghosts.values(), ...this.runs.values()].map((run) => run.plots?.track).filter(Boolean);
     if (!tracks.length) return;
+    const mu = [...this.runs.values()].find((run) => run.plots)?.mu ?? 1;
+    pen.globalAlpha = slippery(mu);
+    pen.fillStyle = paint("patch");
+    pen.fillRect(0, 0, width, height);
+    pen.globalAlpha = 1;
     const points = tracks.flatMap((track) => track.tracks.flatMap(({ x, y }) => x.map((v, i) => [v, y[i]]).filter(([a, b]) => a != null && b != null)));
     const course = tracks.at(-1), all = [...points, ...course.cones.map((cone) => [cone[0], cone[1]])];
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
@@ -211,7 +226,7 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    const frictions = [...new Set(course.patches.map(({ mu }) => mu))].filter((mu) => slippery(mu)).slice(0, 3);
+    const frictions = [...new Set([mu, ...course.patches.map((patch) => patch.mu)])].filter((one) => slippery(one)).slice(0, 3);
     const caption = [`from above, ${Math.round(right - left)} m`, course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, stretch > 1.05 && `cars and widths are ${stretch.toFixed(1)} times larger`].filter(Boolean);
     const rows = [[]];
     for (const part of caption) { if (rows.at(-1).length && pen.measureText([...rows.at(-1), part].join("; ")).width > width - 20) rows.push([]); rows.at(-1).push(part); }

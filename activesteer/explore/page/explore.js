@@ -12,8 +12,8 @@ const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typica
 
 export function say(text, hint = false) {
   $("message").textContent = text;
-  $("message").classList.toggle("hint", hint);
-  $("message").hidden = !text;
+  $("alert").classList.toggle("hint", hint);
+  $("alert").hidden = !text;
 }
 
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
@@ -34,13 +34,14 @@ const choice = () => ({ ...Object.fromEntries(NAMED.map((id) => [id, $(id).value
 
 function describe(ticked) {
   const unticked = untickBeyond(mostControllers, boxes(), ticked);
-  if (!chosen().length) { say("Choose at least one controller.", true); return; }
+  if (!chosen().length) { without(); return; }
   say(unticked.length ? `${unticked.join(", ")} is not driven: ${mostControllers} controllers are the most. Untick another one first.` : "", true);
   if (unticked.includes(ticked?.value)) return;
   asking.stop();
   // Another controller leaves the sliders where they are; they apply where the new choice has them.
   if (ticked) state.wanted = state.values;
   else curves.whole();
+  usable(false);
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
@@ -50,11 +51,12 @@ function describe(ticked) {
 // The address names the choice, so that it can be opened again: #maneuver=slalom&controllers=none,lqr&speed_kmh=70
 function readAddress() {
   const wanted = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
-  for (const id of NAMED) offer($(id), wanted[id] ?? FIRST[id]);
-  const names = wanted.controllers?.split(",") ?? FIRST.controllers;
+  const explore = wanted.drive == null ? wanted : {};
+  for (const id of NAMED) offer($(id), explore[id] ?? FIRST[id]);
+  const names = explore.controllers?.split(",") ?? FIRST.controllers;
   for (const name of names) if (!boxes().some((box) => box.value === name)) addBox(name);
   for (const box of boxes()) box.checked = names.includes(box.value);
-  state.wanted = wanted.drive == null ? wanted : {};
+  state.wanted = explore;
   describe();
   if (wanted.drive != null) { drive.choose(wanted); show("drive"); } else if (drive.shown) show("explore");
 }
@@ -70,11 +72,23 @@ function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
   swatches.set(name, element("i", { class: "swatch" }));
-  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, swatches.get(name), name));
+  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, name, swatches.get(name)));
+}
+
+function without() {
+  asking.stop();
+  say("Choose at least one controller.", true);
+  $("state").textContent = "";
+}
+
+// Whether the results are those of the choice. Others, of before a run that failed, are pale, and cannot be saved.
+function usable(is, old = false) {
+  for (const id of ["save", "report", "copy-command", "copy-python"]) $(id).disabled = !is;
+  $("results").classList.toggle("old", old);
 }
 
 const asking = new Asking((dragging) => {
-  if (!chosen().length) { asking.stop(); say("Choose at least one controller.", true); return; }
+  if (!chosen().length) { without(); return; }
   if (!dragging || !state.dragged) keepGhosts();
   state.dragged = dragging;
   state.released = false;
@@ -83,6 +97,7 @@ const asking = new Asking((dragging) => {
   state.first = null;
   writeAddress();
   $("state").textContent = "driving …";
+  usable(false);
   if (drive.shown) return;
   socket.send({ kind: "run", id: ++state.id, ...choice(), dragging, values: state.values });
 });
@@ -113,6 +128,10 @@ const hear = {
     state.wanted = {};
     showSliders();
     scene.setShape(header.shape, arrays);
+    // A driver follows a path; an own one may do more.
+    $("driver").disabled = header.steered && ![...$("driver").options].some(({ value }) => value.includes("."));
+    $("driver").title = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself." : "";
+    if ($("driver").disabled) $("driver").value = FIRST.driver;
     asking.ask(false);
   },
 
@@ -121,7 +140,7 @@ const hear = {
     showTitle(header.title);
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
-    if (header.error) say(`${header.name}: ${header.error}`);
+    if (header.error) { state.failed = state.id; say(`${header.name}: ${header.error}`); }
     if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
     redraw();
@@ -131,6 +150,8 @@ const hear = {
     if (header.id !== state.id) return;
     state.released = !state.dragged;
     state.all = performance.now() - state.asked;
+    if (state.failed != null && state.failed !== state.id) { state.failed = null; say(""); } // its cause is gone
+    usable(!!header.command);
     $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${/\d A\b/.test($("title").textContent) ? "; A: steering wheel angle at 0.3 g" : ""}`;
     $("command").textContent = header.command;
     $("python").textContent = header.python;
@@ -140,9 +161,16 @@ const hear = {
   saved(header) { $("saved").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
   report() { window.open("report", "_blank"); },
   error(header) {
+    if (["run", "describe"].includes(header.about) && header.id !== state.id) return; // of an older choice
     say(header.text);
     $("state").textContent = "";
     if (header.about === "start") drive.failed();
+    if (header.about === "run" || header.about === "describe") {
+      state.failed = header.about === "run" ? state.id : null;
+      if (!state.runs.size) redraw(); // of another choice
+      usable(false, true);
+      $("command").textContent = $("python").textContent = "";
+    }
     if (header.about === "run") asking.finished();
     if (header.about === "save") $("saved").textContent = header.text;
   },
@@ -156,13 +184,14 @@ function redraw() {
   curves.show(state.runs, state.ghosts);
   track.show(state.runs, state.ghosts);
   const drawn = [...state.runs.values()].filter((run) => run.poses);
+  $("figures").hidden = !drawn.length;
   for (const name of [...scene.cars.keys()]) if (!state.runs.has(name)) scene.remove(name);
   for (const run of drawn) scene.car(run.name, run.place);
   const course = drawn[0]?.plots.track;
   if (course && state.course !== state.id) {
     state.course = state.id;
     const lanes = course.lanes.map((lane) => ({ start_x_m: lane.x[0], end_x_m: lane.x[1], right_y_m: lane.y[0], left_y_m: lane.y[1] }));
-    scene.setCourse({ cones: course.cones, lanes, patches: course.patches });
+    scene.setCourse({ cones: course.cones, lanes, patches: course.patches, mu: drawn[0].mu ?? undefined });
   }
   player.length();
   showFigures();
@@ -205,7 +234,9 @@ function showFigures() {
     return element("td", {}, number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   if (runs.some((run) => run.losses.length)) rows.unshift(element("tr", {}, element("th", {}, "Fails"), ...runs.map((run) => element("td", {}, run.losses.join("; ")))));
+  $("figures").classList.toggle("many", runs.length > 2);
   $("figures").replaceChildren(head, ...rows);
+  curves.besides($("figures").parentElement);
 }
 
 function showSliders() {
@@ -308,7 +339,12 @@ small.addEventListener("change", fit);
 fit();
 addEventListener("hashchange", readAddress);
 // On a phone, the choice makes room for its results.
-for (const id of NAMED) $(id).addEventListener("change", () => { if (small.matches) $("choice").open = false; describe(); });
+for (const id of NAMED) $(id).addEventListener("change", () => {
+  if (small.matches) $("choice").open = false;
+  const kept = id === "maneuver" ? {} : state.values; // another car or driver leaves the sliders where they are
+  describe();
+  state.wanted = kept;
+});
 $("group").addEventListener("change", showGroup);
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
@@ -322,6 +358,7 @@ for (const what of ["command", "python"]) {
     setTimeout(() => { target.textContent = "Copy"; }, 1500);
   });
 }
+$("close").addEventListener("click", () => say(""));
 $("theme").addEventListener("click", () => setTheme(!dark()));
 onTheme(showFigures);
 

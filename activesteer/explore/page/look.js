@@ -2,6 +2,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const root = document.documentElement;
 const watchers = [];
+const store = (() => { try { return sessionStorage; } catch { return null; } })(); // light or dark, until the tab is closed
 
 export const { courses, mostControllers, systems } = data;
 export const small = matchMedia("(max-width: 760px), (max-height: 450px)"); // a telephone, upright or on its side
@@ -16,10 +17,11 @@ export const slippery = (mu) => Math.min(1, Math.max(0, (0.9 - mu) / 0.6));
 
 export function setTheme(isDark) {
   root.classList.toggle("dark", isDark);
+  store?.setItem("dark", isDark);
   for (const watcher of watchers) watcher();
 }
 
-setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
+setTheme(JSON.parse(store?.getItem("dark") ?? "null") ?? matchMedia("(prefers-color-scheme: dark)").matches);
 
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);

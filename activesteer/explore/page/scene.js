@@ -152,6 +152,7 @@ export class Scene {
     if (!car) return;
     this.scene.remove(...car.bodies, car.trail, car.shadow);
     this.cars.delete(name);
+    this.stale = true;
   }
 
   // Place the bodies of a car: 7 numbers each, position and quaternion w x y z, between two rows of poses.

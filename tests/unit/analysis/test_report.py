@@ -258,7 +258,10 @@ def test_curves_are_in_degrees_and_thinned(page):
 
 def test_added_angles_are_those_of_the_systems_that_add_any(page):
     panel = next(panel for panel in data_of(page)[0]["panels"] if panel["title"].startswith("Added"))
-    assert [(series["run"], series["dotted"]) for series in panel["series"]] == [(1, False), (2, False)]
+    assert [(series["run"], series["dotted"]) for series in panel["series"]] == [
+        (1, False),
+        (2, True),
+    ]  # rear wheels, dotted: front superposition
 
 
 def test_what_sensors_say_is_drawn_with_the_truth_dotted_where_it_was_recorded():

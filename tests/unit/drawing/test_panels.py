@@ -32,7 +32,8 @@ def test_every_channel_of_every_panel_is_recorded() -> None:
         for line in panel.lines:
             if line.channel == PATH_DISTANCE:
                 continue
-            wanted = {*AXLE_SLIP.get(line.channel, (line.channel,)), line.demand, line.beside} - {""}
+            channels = [f"{wheel}_slip_angle_rad" for wheel in AXLE_SLIP.get(line.channel, ())] or [line.channel]
+            wanted = {*channels, line.demand, line.beside} - {""}
             # A car with sensors or an estimator records a true value under a second name.
             assert {each.removeprefix("measured_").removeprefix("estimated_") for each in wanted} <= recorded, name
 

@@ -20,7 +20,7 @@ Object.assign(globalThis, {
 export const sent = [];
 export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
-export class Curves { show() {} at() {} whole() {} }
+export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
 export class Scene { cars = new Map(); setShape() {} setSurface() {} draw() {} follow() {} }
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }

@@ -94,8 +94,32 @@ def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tm
 
 
 def test_a_failed_run_does_not_stop_the_next_value(tmp_path: Path) -> None:
-    page = used(tmp_path, "drag(90); drag(100); hear({ kind: 'error', text: 'no', about: 'run' }, []);")
+    page = used(
+        tmp_path, "drag(90); drag(100); hear({ kind: 'error', text: 'no', about: 'run', id: sent.at(-1).id }, []);"
+    )
     assert page["runs"] == [[90, True], [100, True]]
+
+
+def test_results_of_a_choice_that_failed_cannot_be_saved_and_the_error_goes_with_its_cause(tmp_path: Path) -> None:
+    shown = """const shown = () => [$("save").disabled, $("command").textContent, $("message").textContent];
+        const fail = () => hear({ kind: "error", text: "too slippery", about: "run", id: sent.at(-1).id }, []);"""
+    page = used(
+        tmp_path,
+        shown
+        + """const steps = [shown()];
+        drag(90); fail(); steps.push(shown());
+        drag(80);
+        hear({ kind: "error", text: "of an older choice", about: "run", id: sent.at(-1).id - 1 }, []);
+        steps.push(shown());
+        hear({ kind: "run", id: sent.at(-1).id, name: "none", title: "", figures: [], losses: [] }, [undefined]);
+        hear({ kind: "finished", id: sent.at(-1).id, command: "activesteer run", python: "" }, []); steps.push(shown());
+        $("saved").textContent = JSON.stringify(steps);""",
+    )
+    before, failed, driving, driven = json.loads(page["saved"])
+    assert before[0]  # its only run has failed
+    assert failed == [True, "", "too slippery"]
+    assert driving == [True, "", "too slippery"]
+    assert driven == [False, "activesteer run", ""]
 
 
 def test_a_held_key_drives_on_the_way_and_once_more_at_the_end(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.errors import ManeuverError, ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
 from activesteer.explore.runs import Reply, Runs
@@ -63,6 +64,24 @@ def test_every_manoeuvre_starts_and_holds_what_its_search_found_while_a_slider_m
     for key in [key for key in sliders if key.startswith("road.mu")]:
         assert list(runs.run(RunRequest(maneuver=maneuver, values={key: 0.55}), lambda: True)) == []
     assert ("road.mu" in sliders) != ("road.mu_left" in sliders)
+
+
+def test_what_has_failed_leaves_nothing_to_save_and_a_command_names_the_controllers_that_drove(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    *_, done = runs.run(RunRequest(maneuver="step_steer", controllers=("none", "tv"), driver="novice"), lambda: False)
+    assert "-c none" in done.header["command"]
+    assert "tv" not in done.header["command"]  # this car has no electric axle
+    assert len(runs.save().header["files"]) == 1
+    with pytest.raises(ManeuverError, match="too slippery"):
+        list(runs.run(RunRequest(maneuver="step_steer", values={"road.mu": 0.2}), lambda: False))
+    with pytest.raises(ParameterError, match="no run to save"):
+        runs.save()
+
+
+def test_a_driver_is_offered_where_one_steers(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    assert runs.describe(Describe(maneuver="sine_with_dwell")).header["steered"]
+    assert not runs.describe(Describe(maneuver="slalom")).header["steered"]
 
 
 def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:

@@ -86,6 +86,21 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     assert scenario.car.config.factors.mass == 1.1
 
 
+@pytest.mark.parametrize(
+    ("maneuver", "key", "value", "title"),
+    [
+        ("sine_with_dwell", "steer.amplitude_factor", 2, "Sine with dwell, 80 km/h, 2 A, dry"),
+        ("step_steer", "steer.lateral_acceleration_mps2", 5.886, "Step steer, 80 km/h, 0.6 g, dry"),
+        ("brake_in_turn", "turn.lateral_acceleration_g", 0.4, "Braking in a turn, 80 km/h, 3.92 m/s², dry"),
+        ("slalom", "cones.spacing_m", 36, "Slalom 36 m, 100 km/h, dry"),
+        ("double_lane_change_low_mu", "road.mu", 0.3, "Double lane change ISO 3888-1, 80 km/h, friction 0.3"),
+        ("parking", "road.mu", 0.3, "Parking: lock to lock at rest"),
+    ],
+)
+def test_title_says_the_values_that_are_driven(maneuver: str, key: str, value: float, title: str):
+    assert resolve(maneuver, overrides={key: value}).maneuver.title == title
+
+
 def test_title_says_the_speed_that_is_driven():
     assert resolve("slalom").maneuver.title == "Slalom 45 m, 100 km/h, dry"
     assert resolve("slalom", overrides={"speed_kmh": 131}).maneuver.title == "Slalom 45 m, 131 km/h, dry"
