@@ -47,7 +47,7 @@ MEMORY: Final = np.dtype(
             ("covariance", np.float64, (N_STATES, N_STATES)),
             ("now", np.float64, (N_STATES,)),
             *((name, np.float64) for name in ("front_angle_rad", "rear_angle_rad", "ax_mps2")),
-            *((name, np.float64) for name in ("front_along_N", "moment_Nm", "loading_mps2", "rolling_mps")),
+            *((name, np.float64) for name in ("front_along_N", "moment_Nm", "loading_mps2")),
             *((name, np.float64) for name in ("roll_rad", "roll_rate_radps")),
             *((name, np.float64, (4,)) for name in ("along_N", "load_N", "by_wheel_mps", "not_slid_s")),
         ],
@@ -59,7 +59,7 @@ The estimate and the number of calls. The last step of the filters: time since t
 and of the yaw rate over their expected covariances, sum of what is unexplained in them, wheels left out, smoothed and
 largest use of the friction, last samples. States and covariances of the filters, and the present state. Inputs of the
 model: steer angles, longitudinal acceleration, longitudinal force of the front axle, moment of all longitudinal forces,
-lateral acceleration that loads the wheels, lateral speed of the roll axis relative to v_y, roll; and for each wheel its
+lateral acceleration that loads the wheels, roll; and for each wheel its
 longitudinal force, its load, the speed of the car by this wheel, and the time since it slid.
 """
 
@@ -71,8 +71,9 @@ KNOWN: Final = np.dtype(
                 "mass_kg", "yaw_inertia_kgm2", "cg_to_front_m", "cg_to_rear_m", "front_compliance_radpN",
                 "rear_compliance_radpN", "front_load_N", "rear_load_N", "front_load_kg", "rear_load_kg",
                 "along_load_kg", "front_relaxation_m", "rear_relaxation_m", "angle_step_rad", "front_load_step_N",
-                "rear_load_step_N", "roll_gradient_radpmps2", "roll_speed_radps", "roll_damping", "roll_arm_m",
-                "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2", "steering_ratio", "largest_ay_g",
+                "rear_load_step_N", "roll_gradient_radpmps2", "roll_speed_radps", "roll_damping",
+                "front_roll_arm_m", "rear_roll_arm_m", "pitch_gain", "drag_kgpm", "wheel_inertia_kgm2",
+                "steering_ratio", "largest_ay_g",
                 *(one.name for one in fields(EstimatorParameters)),
                 "ay_offset_std_mps2", "ay_offset_s", "rate_offset_std_radps", "rate_walk_rad2ps3",
                 "rate_variance_rad2ps2", "ay_variance_m2ps4", "ax_offset_std_mps2", "ax_offset_density_m2ps5",
@@ -148,7 +149,8 @@ def _car(setup: EstimatorSetup, parameters: EstimatorParameters) -> dict[str, fl
         "roll_gradient_radpmps2": more.roll_gradient_radpmps2,
         "roll_speed_radps": 2.0 * math.pi * more.roll_frequency_Hz,
         "roll_damping": more.roll_damping,
-        "roll_arm_m": more.roll_arm_m,
+        "front_roll_arm_m": more.front_roll_arm_m,
+        "rear_roll_arm_m": more.rear_roll_arm_m,
         "pitch_gain": GRAVITY_MPS2 * more.pitch_gradient_radpmps2,
         "drag_kgpm": setup.drag_per_speed2_kgpm,
         "wheel_inertia_kgm2": more.wheel_inertia_kgm2,

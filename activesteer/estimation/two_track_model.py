@@ -4,7 +4,7 @@ For the axles i = f, r:
 
     m (v_y' + r v_x) = F_f cos d_f + F_r cos d_r + X_f sin d_f + m g_y
     J_z r'           = l_f (F_f cos d_f + X_f sin d_f) - l_r F_r cos d_r + M_x
-    s_i / v_x a_i'   = d_i - (v_y + h p' +- l_i r) / v_x - c_i F_i - q_i p + e_i - a_i
+    s_i / v_x a_i'   = d_i - (v_y + h_i p' +- l_i r) / v_x - c_i F_i - q_i p + e_i - a_i
     F_i              = sum over the axle's wheels of u F_y(a_i / u, F_z)
     p'' + 2 D w p' + w^2 p = w^2 k a_y
 
@@ -14,9 +14,10 @@ the road by similarity (u w at the rear axle, which may have other tyres), and t
 relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not its peak, as LKY does in the
 Magic Formula. With a longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the
 force at small slip angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2
-deg). The body rolls by p as a mass on a spring, about an axis that lies h below the centre of gravity, so that the
-axles also move sideways by h p'. Springs and dampers of the body load the wheels. The compliance c_i is the difference
-between the identified cornering stiffness of the axle and the stiffness of its tyres:
+deg). The body rolls by p as a mass on a spring. The points of the wheels whose slip the tyres feel, contact points or
+wheel centres, then move sideways by h_i p' relative to the centre of gravity. Springs and dampers of the body load the
+wheels. The compliance c_i is the difference between the identified cornering stiffness of the axle and the stiffness of
+its tyres:
 
     c_i = 1 / C_i - 1 / (2 C_tyre) - q_i k / m_i
 
@@ -135,9 +136,10 @@ def forces_of(known, tyres, memory, state):
 @inlined
 def slip_angles(known, memory, state, vx_mps):
     """Return the slip angles of both axles from only the motion of the car [rad]."""
-    across_mps = state[LATERAL_SPEED] + memory.rolling_mps
-    front_rad = memory.front_angle_rad - (across_mps + known.cg_to_front_m * state[YAW_RATE]) / vx_mps
-    rear_rad = memory.rear_angle_rad - (across_mps - known.cg_to_rear_m * state[YAW_RATE]) / vx_mps
+    across_mps, rate_radps = state[LATERAL_SPEED], memory.roll_rate_radps
+    front_mps = across_mps + known.front_roll_arm_m * rate_radps + known.cg_to_front_m * state[YAW_RATE]
+    rear_mps = across_mps + known.rear_roll_arm_m * rate_radps - known.cg_to_rear_m * state[YAW_RATE]
+    front_rad, rear_rad = memory.front_angle_rad - front_mps / vx_mps, memory.rear_angle_rad - rear_mps / vx_mps
     return front_rad, rear_rad
 
 
@@ -177,7 +179,7 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """Advance the roll of the body by an interval, with its effects `loading_mps2` and `rolling_mps` on the wheels.
+    """Advance the roll of the body by an interval, with its effect `loading_mps2` on the wheels.
 
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
     """
@@ -188,7 +190,6 @@ def follow_roll(known, memory, ay_mps2, duration_s):
         pull = speed * (gradient * ay_mps2 - memory.roll_rad) - 2.0 * damping * memory.roll_rate_radps
         memory.roll_rate_radps += dt * speed * pull
         memory.roll_rad += dt * memory.roll_rate_radps
-    memory.rolling_mps = known.roll_arm_m * memory.roll_rate_radps
     # A body that does not roll loads the wheels at once.
     carried = memory.roll_rad + 2.0 * damping / speed * memory.roll_rate_radps
     memory.loading_mps2 = carried / gradient if gradient > 0.0 else ay_mps2

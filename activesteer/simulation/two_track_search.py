@@ -4,6 +4,13 @@ The steering wheel turns to one side and then to the other for about 2 m/s2 each
 difference between both sides gives load transfer and roll angle over lateral acceleration. Natural frequency and
 damping of the roll are fitted to the whole run, with the roll angle as the answer of a second-order system to the
 lateral acceleration.
+
+The same run gives the lateral speed h_i of the wheels per roll rate p'. Their slip angles follow with a lag, the
+relaxation length s_i, which is fitted too:
+
+    s_i / v_x a_i' = d_i - (v_y + h_i p' +- l_i r) / v_x + c p + a_0 - a_i
+
+The term c p stands for the camber and for small errors of the axle's distance l_i.
 """
 
 from __future__ import annotations
@@ -15,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.source import RecordingLike
-from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.errors import ModelError
 from activesteer.scenario import FileOrTable, resolve
 from activesteer.simulation.preparation import Run
@@ -53,6 +60,13 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
     change_mps2 = _between_sides(turned, ay)
     if not change_mps2 > 2.0 * _LEAST_MPS2:
         raise ModelError(f"the car turns with only {0.5 * change_mps2:.2g} m/s2 in a test for [two_track]")
+    arms_m = [
+        _roll_arm(*_slip_and_motion(turned, axle, to_axle_m))
+        for axle, to_axle_m in (
+            ("f", scenario.car.config.single_track.cg_to_front_m),
+            ("r", -scenario.car.config.single_track.cg_to_rear_m),
+        )
+    ]
     front_Nm, rear_Nm = (
         track * _between_sides(turned, _channel(turned, f"{axle}r_tyre_fz_N") - _channel(turned, f"{axle}l_tyre_fz_N"))
         for axle, track in zip("fr", (0.5 * each for each in tracks_m), strict=True)
@@ -68,7 +82,8 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
         roll_gradient_radpmps2=gradient,
         roll_frequency_Hz=frequency_Hz,
         roll_damping=damping,
-        roll_arm_m=max(0.0, (height_m - float(body.cg_m[2])) / (GRAVITY_MPS2 * gradient)),
+        front_roll_arm_m=arms_m[0],
+        rear_roll_arm_m=arms_m[1],
         pitch_gradient_radpmps2=_pitch_gradient(run(resolve(_BRAKING, vehicle, overrides))),
         wheel_inertia_kgm2=float(car.model.body_inertia[wheels].max(axis=1).mean()),  # about the axis
     )
@@ -122,6 +137,49 @@ def _roll(ay: Array, roll: Array, gradient: float, step_s: float) -> tuple[float
 
     found = least_squares(residual, [2.0, 0.3], bounds=([0.2, 0.02], [9.0, 5.0]))
     return float(found.x[0]), float(found.x[1])
+
+
+def _slip_and_motion(turned: RecordingLike, axle: str, to_axle_m: float) -> tuple[Array, Array, Array, Array, float]:
+    """Return the arguments of `_roll_arm`, for an axle in front of the centre of gravity by a distance."""
+    slip, steer = (
+        0.5 * (_channel(turned, f"{axle}l_{name}_rad") + _channel(turned, f"{axle}r_{name}_rad"))
+        for name in ("slip_angle", "steer")
+    )
+    across_mps = _channel(turned, "vy_mps") + to_axle_m * _channel(turned, "yaw_rate_radps")
+    speed_mps = _channel(turned, "vx_mps")
+    per_step_m = float(speed_mps.mean()) * float(turned.time_s[1] - turned.time_s[0])
+    roll, rate = _channel(turned, "roll_rad"), _channel(turned, "roll_rate_radps")
+    # A positive slip angle of the recording gives a negative force.
+    return -slip, steer - across_mps / speed_mps, roll, rate / speed_mps, per_step_m
+
+
+def _roll_arm(slip: Array, unrolled: Array, roll: Array, rate_radpm: Array, per_step_m: float) -> float:
+    """Return the lateral speed of an axle's wheels per roll rate [m].
+
+    Args:
+        slip: Mean slip angle of the wheels, positive for a positive force [rad].
+        unrolled: The same without relaxation, from steer angle and motion of a body that does not roll [rad].
+        roll: Roll angle [rad].
+        rate_radpm: Roll rate over speed [rad/m].
+        per_step_m: Road between two samples [m].
+    """
+    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
+    from scipy.signal import lfilter  # noqa: PLC0415
+
+    def fitted(relaxation_m: float) -> tuple[Array, Array]:
+        kept = math.exp(-per_step_m / relaxation_m)
+        columns = np.array([unrolled, -rate_radpm, roll]).T
+        start = columns[0]
+        moved = start + lfilter([1.0 - kept], [1.0, -kept], columns - start, axis=0)
+        known, unknown = moved[:, 0], np.column_stack((moved[:, 1:], np.ones(len(roll))))
+        found = np.linalg.lstsq(unknown, slip - known, rcond=None)[0]
+        return found, known + unknown @ found
+
+    def residual(place: Array) -> Array:
+        return (fitted(math.exp(place[0]))[1] - slip)[::_EVERY] / np.ptp(slip)
+
+    found = least_squares(residual, [math.log(0.2)], bounds=([math.log(1e-3)], [math.log(5.0)]))
+    return float(fitted(math.exp(found.x[0]))[0][0])
 
 
 def _pitch_gradient(recording: RecordingLike) -> float:

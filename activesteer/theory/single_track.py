@@ -245,8 +245,11 @@ class TwoTrackParameters:
     """Natural frequency of the body's roll [Hz]."""
     roll_damping: Annotated[float, Range(0.01, 10.0)]
     """Damping ratio of the body's roll."""
-    roll_arm_m: Annotated[float, Range(0.0, 2.0)]
-    """Height of the centre of gravity above the body's roll axis [m]."""
+    front_roll_arm_m: Annotated[float, Range(-2.0, 2.0)]
+    """Lateral speed of the front wheels per roll rate, relative to the centre of gravity, at the points whose slip the
+    tyres feel [m]. Such a point is the contact point, or the wheel centre by `tyres.conventions.slip_velocity`."""
+    rear_roll_arm_m: Annotated[float, Range(-2.0, 2.0)]
+    """The same of the rear wheels [m]."""
     pitch_gradient_radpmps2: Annotated[float, Range(0.0, 0.1)]
     """Pitch angle per deceleration, nose down [rad/(m/s2)]."""
     wheel_inertia_kgm2: _Positive = 1.0

@@ -17,7 +17,7 @@ from activesteer.errors import ControllerError
 from activesteer.resources import find_vehicle, models_dir
 from activesteer.scenario import load_car
 from activesteer.simulation.runner import run_scenario
-from activesteer.simulation.two_track_search import _roll, two_track_lines, two_track_of
+from activesteer.simulation.two_track_search import _roll, _roll_arm, two_track_lines, two_track_of
 from activesteer.standards.examination import examine
 from activesteer.studies.linear.margins import loop_margins
 from tests.raising import raises
@@ -86,7 +86,9 @@ def test_two_track_properties_are_those_of_earlier_tests():
     assert found.roll_gradient_radpmps2 == pytest.approx(known.roll_gradient_radpmps2, rel=0.02)
     assert found.roll_frequency_Hz == pytest.approx(known.roll_frequency_Hz, rel=0.05)
     assert found.roll_damping == pytest.approx(known.roll_damping, abs=0.06)
-    assert found.roll_arm_m == pytest.approx(known.roll_arm_m, rel=0.1)
+    # The file has the excess of load_height_m over the height of the centre of gravity, over the roll angle per g.
+    assert found.front_roll_arm_m == pytest.approx(known.front_roll_arm_m, rel=0.1)
+    assert found.rear_roll_arm_m == pytest.approx(known.rear_roll_arm_m, rel=0.1)
     assert found.pitch_gradient_radpmps2 == pytest.approx(known.pitch_gradient_radpmps2, rel=0.2)
     assert found.wheel_inertia_kgm2 == pytest.approx(known.wheel_inertia_kgm2, rel=0.01)
     # The written table rounds to 1 mm and to 1e-5 rad/(m/s2), 0.3 % of the gradients.
@@ -100,6 +102,28 @@ def test_frequency_and_damping_of_a_known_roll_are_found():
     speed, damping, gradient = 2.0 * math.pi * 1.7, 0.35, 0.01
     _, roll, _ = lsim(([gradient * speed**2], [1.0, 2.0 * damping * speed, speed**2]), ay - ay[0], time_s)
     assert _roll(ay, np.asarray(roll), gradient, 1e-3) == pytest.approx((1.7, 0.35), rel=0.01)
+
+
+@pytest.mark.parametrize(("arm_m", "relaxation_m"), [(0.47, 0.5), (-0.03, 0.02)])
+def test_the_arm_of_an_axle_whose_tyres_lag_is_found(arm_m, relaxation_m):
+    time_s, speed_mps = np.arange(0.0, 5.0, 1e-3), 22.0
+    roll = 0.02 * np.sin(2.0 * math.pi * 1.2 * time_s) * np.exp(-0.3 * time_s)
+    rate_radpm = np.gradient(roll, time_s) / speed_mps
+    unrolled = np.where(time_s < 2.5, 0.02, -0.02)
+    inputs = unrolled - arm_m * rate_radpm + 0.01 * roll + 0.001
+    _, slip, _ = lsim(([1.0], [relaxation_m / speed_mps, 1.0]), inputs - inputs[0], time_s)
+    found_m = _roll_arm(np.asarray(slip) + inputs[0], unrolled, roll, rate_radpm, speed_mps * 1e-3)
+    # The fit holds its inputs for a sample of 0.022 m, `lsim` interpolates them: 0.002 m.
+    assert found_m == pytest.approx(arm_m, abs=0.005)
+
+
+@pytest.mark.parametrize("vehicle", ["sedan", pytest.param("tesla_model_s", marks=pytest.mark.slow)])
+def test_arms_in_a_vehicle_file_are_those_of_a_step(vehicle):
+    """The sedan had 0.469 m, the arm of its contact points. Its tyres feel the slip of their wheel centres."""
+    known, found = load_car(vehicle).config.two_track, two_track_of(vehicle, run_scenario)
+    assert known is not None
+    for axle in ("front", "rear"):
+        assert getattr(found, f"{axle}_roll_arm_m") == pytest.approx(getattr(known, f"{axle}_roll_arm_m"), abs=0.02)
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def one_run(known, tyres, rng: np.random.Generator, kind):
         front_N, rear_N = forces_of(known, tyres, true, state)
         ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg
         follow_roll(known, true, ay_mps2, INTERVAL_S)
-        for name in ("roll_rad", "loading_mps2", "rolling_mps"):
+        for name in ("roll_rad", "loading_mps2", "roll_rate_radps"):
             memory[name] = true[name]
         front_N, rear_N = forces_of(known, tyres, true, state)
         ay_mps2 = (front_N * math.cos(angle_rad) + rear_N) / known.mass_kg

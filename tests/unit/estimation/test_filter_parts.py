@@ -30,7 +30,7 @@ from activesteer.estimation.records import (
 )
 from activesteer.estimation.setup import GRID
 from activesteer.estimation.speed_filter import brush_slip, read_wheels
-from activesteer.estimation.two_track_model import follow, follow_roll, forces_of
+from activesteer.estimation.two_track_model import follow, follow_roll, forces_of, slip_angles
 from activesteer.scenario import resolve
 from tests.unit.estimation.drives import estimates, rolling
 
@@ -80,9 +80,17 @@ def test_the_body_rolls_as_a_damped_oscillator_whose_springs_and_dampers_load_th
         rate = end_rad * fading * speed**2 / free * math.sin(phase)
         loading = (expected + 2.0 * damping / speed * rate) / known.roll_gradient_radpmps2
         assert memory.loading_mps2 == pytest.approx(loading, abs=0.03 * ay_mps2)
-        assert memory.rolling_mps == pytest.approx(
-            known.roll_arm_m * rate, abs=0.03 * known.roll_arm_m * speed * end_rad
-        )
+        assert memory.roll_rate_radps == pytest.approx(rate, abs=0.03 * speed * end_rad)
+
+
+def test_a_rolling_body_moves_each_axle_by_its_own_arm(known, memory):
+    different, speed_mps = known.copy(), 20.0
+    different.front_roll_arm_m, different.rear_roll_arm_m = -0.1, 0.4
+    resting = slip_angles(different, memory, memory.state, speed_mps)
+    memory.roll_rate_radps = 0.2
+    front_rad, rear_rad = slip_angles(different, memory, memory.state, speed_mps)
+    assert front_rad - resting[0] == pytest.approx(0.1 * 0.2 / speed_mps)
+    assert rear_rad - resting[1] == pytest.approx(-0.4 * 0.2 / speed_mps)
 
 
 def test_a_steady_turn_has_the_identified_stiffness_with_any_roll_steer(setup):

@@ -34,7 +34,7 @@ HANDLING = dict(
     steering_wheel_gain_mps2prad=math.nan,
     limit_acceleration_mps2=8.0,
 )
-TWO_TRACK = TwoTrackParameters(0.6, 1.51, 1.52, 0.55, 0.009, 2.0, 0.3, 0.4, 0.005, 1.1)
+TWO_TRACK = TwoTrackParameters(0.6, 1.51, 1.52, 0.55, 0.009, 2.0, 0.3, 0.4, 0.38, 0.005, 1.1)
 RESULT = Identification("made up", {"100 m": HANDLING}, PARAMETERS, TWO_TRACK)
 
 
