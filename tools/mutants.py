@@ -87,7 +87,7 @@ ROOMS: Final = {
         "vehicle/native_*.py",
         "unit/vehicle/test_native_*.py unit/vehicle physics/test_toe_link_screw.py physics/test_step_steer.py",
         "physics/test_signs.py physics/test_braking.py physics/test_superposition_actuator.py "
-        "unit/coupling/car/test_export.py",
+        "physics/test_uneven_road.py physics/test_faults.py unit/coupling/car/test_export.py",
     ),
     "analysis/claims": Room(
         "analysis/claims/*.py",

@@ -110,6 +110,8 @@ def _study(options: argparse.Namespace) -> bool:
     result = folder / RESULTS
     made = _progress_of(folder)
     end = f"results: {result}" if result.exists() else f"not finished; resume with `activesteer study {folder}`"
+    if result.exists():
+        end += f"; `activesteer study {folder} --report` writes a page of them"
     terminal.tell(options, made | {"results": str(result) if result.exists() else None}, [*_status(made), end])
     return bool(made["by_status"]) and set(made["by_status"]) <= {"failed", "crashed"}
 

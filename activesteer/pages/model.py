@@ -121,6 +121,8 @@ _NARROW: Final = 3
 """Most columns that fit on a phone."""
 _LONG: Final = 60
 """Length of a cell that needs a line of its own there."""
+_LONG_WORD: Final = 24
+"""The same of a word."""
 _NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")
 
 
@@ -154,7 +156,10 @@ class Table(NamedTuple):
         """True if a phone shows each row as a card, because the table is too wide for it."""
         if self.kind == "contents":  # its rows belong together
             return False
-        return len(self.columns) > _NARROW or any(len(cell) > _LONG for row in self.rows for cell in row)
+        cells = [_plain(cell) for row in self.rows for cell in row]
+        # A long word, such as a key, would be broken.
+        long = any(len(cell) > _LONG or any(len(word) > _LONG_WORD for word in cell.split()) for cell in cells)
+        return long or len(self.columns) > _NARROW
 
     @property
     def number_columns(self) -> frozenset[int]:

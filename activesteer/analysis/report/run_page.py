@@ -147,7 +147,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     """Return the sections of a manoeuvre: its results and plots, the claims about it, its metrics and parameters."""
     runs, found, titles = [run.recording for run in group.runs], results(group), list(key_figures(group))
     names = [run.name for run in group.runs]
-    changed = [*dict.fromkeys(filter(None, map(changed_parameters, group.runs))), *_events(group)]
+    changed = [*_changed(group), *_events(group)]
     driven = Markup("Driven with <b>{}</b> in place of the manoeuvre's own.").format("; ".join(changed))
     judged = any(each["losses"] or each["kept"] for each in found)
     rows = [
@@ -159,10 +159,9 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
         '<span class="better">\N{CHECK MARK} better</span>, <span class="worse">\N{BALLOT X} worse</span> than {}; '
         "\N{ALMOST EQUAL TO} a difference that neither a driver nor a sensor could tell."
     ).format(names[0])
+    marked = any(figure["change"] is not Change.OTHER for each in found for figure in each["figures"])
     heads = ["Run", *(["Result"] if judged else []), *titles]
-    compared = Table(
-        "", heads, rows, kind="results", numbers=len(titles), note=note if len(found) > 1 and titles else ""
-    )
+    compared = Table("", heads, rows, kind="results", numbers=len(titles), note=note if marked else "")
     verdicts = [
         _chip(item, anchor)
         + Markup(' {} <b class="{}">{}</b>').format(
@@ -374,6 +373,14 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
         vehicle = entry(run.recording, "vehicle", "name")
         rows.append([run.source, group.name, controller, vehicle, f"{span_s:.3f} s", overrides][: len(titles)])
     return titles, rows
+
+
+def _changed(group: Group) -> list[str]:
+    """Describe the overrides of all runs, or of each run with its name if they differ."""
+    words = [changed_parameters(run) for run in group.runs]
+    if len(set(words)) == 1:
+        return words[:1] if words[0] else []
+    return [f"{run.name}: {said}" for run, said in zip(group.runs, words, strict=True) if said]
 
 
 def changed_parameters(run: ReportedRun) -> str:

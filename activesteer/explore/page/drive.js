@@ -279,7 +279,7 @@ export class Drive {
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";
-    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : this.missed ? " No time: a gate was missed." : "";
+    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : this.missed ? " No time: a gate was missed." : this.rounds ? " No complete lap." : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
     if (this.shown && this.ready) this.prepare();

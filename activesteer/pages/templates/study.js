@@ -201,7 +201,10 @@ function drawGroup() {
   for (const other of DATA.metrics) {
     if (!DATA.by_group[group][other.name]) continue;
     const known = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
-    if (constantIn(...endsOf(known))) constant.push(`${other.label} ${known.length ? short(known[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
+    const claim = /^claim_(\w+)$/.exec(other.name);
+    if (other.name === "claims_failed") continue; // the claims themselves follow
+    if (claim && constantIn(...endsOf(known))) constant.push(`claim ${claim[1]} ${known[0] ? "reproduced" : "not reproduced"}`);
+    else if (constantIn(...endsOf(known))) constant.push(`${other.label} ${known.length ? short(known[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
     else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label, name: other.name });
   }
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");

@@ -107,7 +107,9 @@ def _metric_row(entry: KcMetric) -> list[Text]:
     value = entry.value if abs(entry.value) > _NOTHING else 0.0
     return [
         entry.axle,
-        Markup('<span title="{}">{}</span>').format(entry.definition, entry.name.replace("_", " ")),
+        Markup('<span title="{}">{}</span>').format(
+            entry.definition, entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
+        ),
         f"{value:.4g}" if math.isfinite(value) else "none",
         entry.unit,
         f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
@@ -316,6 +318,6 @@ def _place(entry: KcMetric) -> float:
 
 def _row_name(entry: KcMetric) -> str:
     assert entry.band is not None
-    name = entry.name.replace("_", " ")
+    name = entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
     band = f"{entry.band[0]:g} to {entry.band[1]:g} {entry.unit}".removesuffix(" -")
     return typeset(f"{entry.axle}  {name}  {entry.value:.4g} ({band})")

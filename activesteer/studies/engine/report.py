@@ -18,7 +18,7 @@ from activesteer.controllers import controller_spec
 from activesteer.core.conventions import Array, run_looks
 from activesteer.core.files import file_word, write_text
 from activesteer.core.metric_table import SIDESLIP_PEAKS, recorded_metric
-from activesteer.core.units import parameter_label
+from activesteer.core.units import parameter_label, typeset
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.pages import Page, Section, Table, Text, render_page
@@ -92,8 +92,8 @@ def _finding(data: Mapping[str, Any]) -> list[Text]:
         columns = {each["label"]: rows["factors"][each["key"]] for each in data["factors"] if each["numeric"]}
         pairs = ((label, np.array([x, rows["metrics"][name]], np.float64)) for label, x in columns.items())
         found = [(_correlation(*pair[:, own & np.isfinite(pair).all(axis=0)]), label) for label, pair in pairs]
-        value, most = max(found, default=(0.0, ""))
-        told += [f"{most} with {controller} ({value:.2f})"] if value else []
+        value, most = max(found, key=lambda pair: abs(pair[0]), default=(0.0, ""))
+        told += [f"{most} with {controller} ({typeset(f'{value:.2f}')})"] if value else []
     words = f"largest rank correlation of the {recorded_metric(name or '').label}: {', '.join(told)}"
     return [f"{data['groups'][0]}: {words}."] if told else []
 
@@ -376,7 +376,7 @@ def _violations(found: Tuning) -> Picture:
         key: np.array([texts[key].index(str(value)) if texts[key] else value for value in column], dtype=np.float64)
         for key, column in columns.items()
     }
-    for key in sorted(numbers, key=lambda key: -_correlation(numbers[key], shown))[:_FACTORS]:
+    for key in sorted(numbers, key=lambda key: -abs(_correlation(numbers[key], shown)))[:_FACTORS]:
         points = [
             Curve(numbers[key][part], shown[part], label, colour, "", 0.0, "o")
             for part, label, colour in ((~broken, "holds", _KEPT), (broken, "violated", _BROKEN))
@@ -389,7 +389,7 @@ def _violations(found: Tuning) -> Picture:
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the magnitude of Spearman's rank correlation, or 0 for a constant."""
+    """Return Spearman's rank correlation, or 0 for a constant."""
     if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
-    return abs(float(np.corrcoef(rankdata(x), rankdata(y))[0, 1]))
+    return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])

@@ -196,8 +196,16 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "2026-01-02" in top
     assert "lost: 57 deg of peak sideslip" in top
-    assert "speed 95 km/h (maneuver.speed_kmh)" in top
+    assert "Driven with none: speed 95 km/h (maneuver.speed_kmh) in place" in top  # not the other runs
     assert top.count("stays under control") == 2
+    better = "\N{CHECK MARK} better"
+    assert better not in top  # nothing is better or worse than a run that is lost
+    for run in runs.values():
+        run.metadata["overrides"] = {"maneuver.speed_kmh": 95}
+        run.metrics["sideslip_peak_rad"] = 0.1
+    top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
+    assert "Driven with speed 95 km/h (maneuver.speed_kmh) in place" in top
+    assert better in top
 
 
 def test_claims_are_judged_where_the_three_systems_are_there(page):

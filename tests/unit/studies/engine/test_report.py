@@ -10,6 +10,8 @@ import subprocess
 from importlib import resources
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from scipy.stats import rankdata
 
@@ -20,7 +22,7 @@ from activesteer.pages import Page, Section, render_page
 from activesteer.studies.engine.analysis import indices
 from activesteer.studies.engine.design import draw
 from activesteer.studies.engine.factors import Factor
-from activesteer.studies.engine.report import write_report
+from activesteer.studies.engine.report import _finding, write_report
 from tests.raising import raises
 from tests.unit.studies.short import RATIO, short_study, write_controller
 
@@ -122,6 +124,41 @@ def test_the_page_holds_what_the_rows_say(page):
     assert metric["unit"] == "deg/s"
 
 
+def test_controllers_are_compared_in_the_same_samples_even_if_some_lack_runs(tmp_path):
+    controllers = ["none", "ars", "afs"]
+    wanted = short_study(controllers=controllers, design={"kind": "morris", "samples": 8}) | {
+        "factors": {"road.mu": {"uniform": [0.5, 0.9]}}
+    }
+    table = study(wanted, output=tmp_path / "s", jobs=1)
+    lost = {("none", 1), ("afs", 0)}
+    left = [(row["controller"], row["sample"]) not in lost for row in table.to_pylist()]
+    for rows, complete in ((table, True), (table.filter(left), False)):
+        pq.write_table(rows, tmp_path / "s" / "results.parquet")
+        text = write_report(tmp_path / "s").read_text(encoding="utf-8")
+        data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+        assert data is not None
+        found = json.loads(data[1])["by_group"][0]["yaw_rate_peak_radps"]
+        degps = {(row["controller"], row["sample"]): np.degrees(row["yaw_rate_peak_radps"]) for row in rows.to_pylist()}
+        for place, name in enumerate(controllers[1:]):
+            both = [sample for sample in range(8) if {("none", sample), (name, sample)} <= degps.keys()]
+            differences = [degps[name, sample] - degps["none", sample] for sample in both]
+            assert found["paired"][place]["quantiles"][1] == pytest.approx(np.median(differences), rel=1e-3, abs=1e-4)
+        assert bool(found["indices"]) == complete
+
+
+def test_a_metric_that_no_run_defines_leaves_the_others(tmp_path):
+    table = study(short_study(0.6, 0.9, controllers=["none"]), output=tmp_path / "s", jobs=1)
+    empty = pa.nulls(len(table), pa.float64())
+    name = "yaw_rate_peak_radps"
+    pq.write_table(table.set_column(table.column_names.index(name), name, empty), tmp_path / "s" / "results.parquet")
+    text = write_report(tmp_path / "s").read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)
+    assert data is not None
+    shown = json.loads(data[1])["by_group"][0]
+    assert name not in shown
+    assert len(shown) > 3
+
+
 def test_the_line_of_a_run_drives_it_again(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     given = {
@@ -161,6 +198,21 @@ def test_the_head_says_what_was_driven_and_on_which_factor_the_first_metric_depe
     on_speed, on_ratio = (abs(np.corrcoef(rankdata(factor), rankdata(peak))[0, 1]) for factor in (speed, ratio))
     assert on_speed > on_ratio
     assert f"speed with none ({on_speed:.2f})" in head
+
+
+def test_the_head_says_whether_a_metric_falls_with_its_factor():
+    """A greater gain gives less sideslip; the ratio hardly matters."""
+    factors = [{"key": key, "label": key, "numeric": True} for key in ("ratio", "gain")]
+    rows = {
+        "group": [0] * 4, "controller": [0] * 4, "metrics": {"sideslip_peak_abs_rad": [4.0, 3.0, 1.0, 2.0]},
+        "factors": {"ratio": [1.0, 2.0, 2.0, 1.0], "gain": [0.1, 0.2, 0.4, 0.3]},
+    }  # fmt: skip
+    data = {
+        "rows": rows, "factors": factors, "controllers": ["ars"], "groups": ["slalom"],
+        "by_group": [{"sideslip_peak_abs_rad": {}}],
+    }  # fmt: skip
+    (words,) = _finding(data)
+    assert "gain with ars (\N{MINUS SIGN}1.00)" in str(words)
 
 
 def test_the_plots_of_several_manoeuvres_stand_where_the_script_looks_for_them(page):

@@ -6,6 +6,7 @@ import json
 import math
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,7 +16,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.studies.engine.factor_values import Plausibility, Prior
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import read_study
-from activesteer.studies.engine.tuning import _searches, read_tuning, tune
+from activesteer.studies.engine.tuning import _plausible, _searches, read_tuning, tune
 from tests.raising import raises
 from tests.unit.studies.short import MANEUVER, RATIO, write_controller
 
@@ -226,6 +227,15 @@ def test_a_search_does_not_mix_its_files_with_those_of_a_study(tmp_path: Path):
     with raises(StudyError, value=tmp_path):
         tune(GAINS, tmp_path, jobs=1, trials=1)
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_the_front_of_plausible_sets_has_fewer_statements_only_for_more_plausibility():
+    """Each set in the front is the most plausible one of its number, and beats all that satisfy more."""
+    sets = [((1, 2), 5.0), ((1, 2), 4.0), ((1,), 4.5), ((2,), 3.0), ((), 3.5), ((), 1.0)]
+    trials: Any = [SimpleNamespace(holding=holding, implausibility=value) for holding, value in sets]
+    front = [(len(one.holding), one.implausibility) for one in _plausible(trials)]
+    assert front == [(2, 4.0), (1, 3.0), (0, 1.0)]
+    assert [one.implausibility for one in _plausible(trials[:3])] == [4.0]
 
 
 def test_distances_are_in_units_of_the_range_on_either_side():

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
 import pytest
 
 from activesteer.config import Range
 from activesteer.errors import ParameterError
-from activesteer.studies.engine.workers import LocalProcesses, workers_for
+from activesteer.studies.engine.workers import _ATTEMPTS, LocalProcesses, TaskQueue, WorkerDied, workers_for
 from tests.raising import raises
 
 
@@ -43,3 +46,46 @@ def test_the_number_of_processes_is_bounded_before_one_is_started(monkeypatch, j
     monkeypatch.setattr("activesteer.studies.engine.workers.LocalProcesses", lambda _: pytest.fail("started"))
     with raises(ParameterError, key=f"--jobs {jobs}", value=jobs, allowed=Range(1, 64)), workers_for(jobs):
         pytest.fail("accepted")
+
+
+class _DyingWorkers:
+    """Workers of which one dies whenever it does the task `deadly`, with all that run beside it."""
+
+    in_flight = 3
+
+    def __init__(self) -> None:
+        self.running: list[tuple[str, Future[str]]] = []
+        self.beside: list[int] = []
+
+    def submit(self, _: Callable[..., Any], function: Callable[[str], str], name: str) -> Future[str]:
+        future: Future[str] = Future()
+        self.running.append((name, future))
+        if name == "deadly":
+            self.beside.append(len(self.running) - 1)
+            for _, other in self.running:
+                other.set_exception(BrokenPipeError())
+        elif len(self.running) == self.in_flight or self.beside:
+            for each, other in self.running:
+                other.set_result(function(each))
+        if future.done():
+            self.running = []
+        return future
+
+    def died(self, error: BaseException) -> bool:
+        return isinstance(error, BrokenPipeError)
+
+    def replace(self) -> None:
+        """Start new processes."""
+
+
+def test_a_task_that_kills_its_worker_is_tried_again_at_last_alone_and_then_given_up() -> None:
+    workers = _DyingWorkers()
+    queue = TaskQueue(workers)  # type: ignore[arg-type]
+    for name in ("before", "deadly", "after"):
+        queue.add(name, str.upper, name)
+    outcomes = {outcome.key: outcome for outcome in queue.outcomes()}
+    assert len(workers.beside) == _ATTEMPTS
+    assert workers.beside[-1] == 0
+    assert isinstance(outcomes["deadly"].error, WorkerDied)
+    assert outcomes["before"].value == "BEFORE"  # blamed for nothing
+    assert outcomes["after"].value == "AFTER"
