@@ -57,7 +57,7 @@ class _DyingWorkers:
         self.running: list[tuple[str, Future[str]]] = []
         self.beside: list[int] = []
 
-    def submit(self, _: Callable[..., Any], function: Callable[[str], str], name: str) -> Future[str]:
+    def submit(self, _alone: Callable[..., Any], function: Callable[[str], str], name: str) -> Future[str]:
         future: Future[str] = Future()
         self.running.append((name, future))
         if name == "deadly":
