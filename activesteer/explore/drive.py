@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -118,7 +119,9 @@ class DriveSession:
         self._mu = course.mu if choice.mu is None else choice.mu
         overrides = {"speed_kmh": self._speed_kmh, "duration_s": _LONGEST_S, "road.mu": self._mu}
         scenario = resolve(course.maneuver, folder.located(choice.vehicle), overrides, self._take)
+        scenario = replace(scenario, maneuver=replace(scenario.maneuver, title=f"{course.title}, driven by hand"))
         self._simulation = Simulation(scenario, folder.located(choice.controllers[0]))
+        self._simulation.context.metadata["driver"]["name"] = "by hand"
         self._names = {"controller": choice.controllers[0]}
         self.path: Path | None = None
         self._files = ExitStack()
@@ -198,11 +201,13 @@ class DriveSession:
         data = loop.vehicle.data
         fallen = self._hit_cones()
         self._time_laps()
-        moving = motion.speed_mps > 1.0
+        speed_mps = math.hypot(motion.speed_mps, motion.lateral_speed_mps)
+        sideslip_deg = math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if speed_mps > 1.0 else 0.0
         header = {
-            "kind": "frame", "time_s": round(simulation.time_s, 3), "speed_kmh": 3.6 * motion.speed_mps,
+            "kind": "frame", "time_s": round(simulation.time_s, 3),
+            "speed_kmh": math.copysign(3.6 * speed_mps, motion.speed_mps),
             "steering_wheel_deg": math.degrees(loop.measurement.steering_wheel_rad),
-            "sideslip_deg": math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if moving else 0.0,
+            "sideslip_deg": sideslip_deg,
             "yaw_rate_degps": math.degrees(motion.yaw_rate_radps), "ay_mps2": truth["ay_mps2"],
             "rear_deg": math.degrees(loop.measurement.rear_steer_rad),
             "superposition_deg": math.degrees(loop.measurement.superposition_rad),
@@ -273,7 +278,10 @@ class DriveSession:
         problem = ""
         try:
             with self._files:
-                simulation.end_file(simulation.recording())
+                recording = simulation.recording()
+                recording.metadata["complete"] = True  # a drive is as long as its driver wants
+                recording.metadata.pop("error", None)
+                simulation.end_file(recording)
         except ActiveSteerError as error:
             problem = str(error)
         return Reply(

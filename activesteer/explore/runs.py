@@ -47,6 +47,7 @@ _MANEUVER: Final = {
     "road.mu": (0.1, 1.1, 0.01),
     "road.mu_left": (0.1, 1.1, 0.01),
     "road.mu_right": (0.1, 1.1, 0.01),
+    "road.patches.0.mu": (0.1, 1.1, 0.01),
     "steer.lateral_acceleration_mps2": (0.5, 9.0, 0.1),
     "steer.amplitude_factor": (0.5, 8.0, 0.1),
     "cones.spacing_m": (20.0, 60.0, 0.5),
@@ -201,6 +202,8 @@ def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], 
         return 0.0, ()
     corners_m, triangles = drawn.mesh(road_of(recording.metadata))
     factors = height_colours(corners_m[:, 2]) / height_colours(np.zeros(1))
+    low = corners_m[:, 2] < 0.0
+    factors[low] = factors[low].min(axis=1, keepdims=True)  # dark: blue is a slippery road
     return drawn.plane_below_m, (corners_m.astype(np.float32), factors.astype(np.float32), triangles.astype(np.float32))
 
 

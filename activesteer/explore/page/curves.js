@@ -124,6 +124,13 @@ export class Curves {
       }] },
     }, data, shown.holder);
     if (zoomed) shown.plot.setScale("x", zoomed);
+    // A finger that slides reads values; up and down the page still scrolls.
+    const { over } = shown.plot;
+    for (const name of ["pointerdown", "pointermove"]) over.addEventListener(name, (event) => {
+      if (event.pointerType !== "touch") return;
+      shown.plot.setCursor({ left: event.clientX - over.getBoundingClientRect().left, top: 1 });
+      this.pointed(this.time = shown.plot.data[0][shown.plot.cursor.idx ?? 0]);
+    });
   }
 
   // Show the whole run again.

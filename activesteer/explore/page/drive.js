@@ -7,7 +7,7 @@ const KEYS = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", Ar
 const SWITCH = ["none", "ars", "afs", "lqr", "esc"], DEAD = 0.06;
 const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for full steering, as a share of its width
 const short = matchMedia("(max-height: 450px)");
-const PLAIN = ["speed", "sideslip", "grip used", "rear wheels", "time", "cones hit"]; // gauges that a phone shows
+const PLAIN = ["speed", "sideslip", "grip", "rear", "time", "cones"]; // gauges that a phone shows
 
 export class Drive {
   constructor(socket, say) {
@@ -59,7 +59,7 @@ export class Drive {
 
   offer(names) {
     $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => option(name)));
-    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name].split(/[:;,]| \(/)[0]}` : name)));
+    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name].split(/[:;]| \(/)[0]}` : name)));
     this.choose({});
   }
 
@@ -243,20 +243,20 @@ export class Drive {
   gauges(header) {
     const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
-      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
-      time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, "cones hit": `${this.struck}`,
-      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear wheels": `${number(header.rear_deg, 1)}°`,
-      "added in front": `${number(header.superposition_deg, 1)}°`, control: header.controller,
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, grip: `${number(100 * header.friction_use, 0)} %`,
+      time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: `${this.struck}`,
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, rear: `${number(header.rear_deg, 1)}°`,
+      "front added": `${number(header.superposition_deg, 1)}°`, control: header.controller,
     };
     if (!$("gauges").children.length) {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
-    $("gauges").children[Object.keys(rows).indexOf("cones hit")].hidden = !this.scene.cones.length;
+    $("gauges").children[Object.keys(rows).indexOf("cones")].hidden = !this.scene.cones.length;
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
-    $("gauges").title = this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "";
+    $("gauges").title = "grip: used share of the friction of the tyre that uses most; rear, front added: angles at the wheels; cones: hit. " + (this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "");
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 

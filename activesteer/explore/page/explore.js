@@ -79,6 +79,7 @@ function without() {
   asking.stop();
   say("Choose at least one controller.", true);
   $("state").textContent = "";
+  usable(false, true);
 }
 
 // Whether the results are those of the choice. Others, of before a run that failed, are pale, and cannot be saved.
@@ -220,8 +221,9 @@ function showColours() {
 
 // On a phone the heading is out of sight while a slider moves.
 function showTitle(title) {
-  $("title").textContent = title;
-  $("held").textContent = /\((.*until you let go)\)$/.exec(title)?.[1] ?? "";
+  const held = /^(.*) \((.*until you let go)\)$/.exec(title);
+  $("title").textContent = small.matches && held ? held[1] : title;
+  $("held").textContent = held?.[2] ?? "";
 }
 
 function showFigures() {
@@ -279,6 +281,10 @@ function sliderOf(slider) {
     asking.ask(dragging);
   };
   input.value = state.values[slider.key] ?? slider.value;
+  // A finger that turns out to scroll has moved nothing.
+  let before = null;
+  input.addEventListener("pointerdown", () => { before = input.value; });
+  input.addEventListener("pointercancel", () => { input.value = before ?? input.value; moved(false); });
   input.addEventListener("input", () => moved(true));
   input.addEventListener("change", () => moved(false));
   input.addEventListener("dblclick", () => { input.value = slider.value; moved(false); });

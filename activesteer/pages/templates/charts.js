@@ -252,7 +252,7 @@ class Chart {
     for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 3 * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 5 * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 

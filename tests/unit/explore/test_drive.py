@@ -57,6 +57,25 @@ def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_p
     recording = activesteer.Recording.open(tmp_path / "drive_plane.mcap")
     assert recording.time_s[-1] == pytest.approx(end["time_s"], abs=2e-3)
     assert recording["yaw_rate_radps"][-1] > 0.0
+    assert recording.metadata["complete"]  # a drive is as long as its driver wants
+    assert recording.metadata["maneuver"]["title"] == "Free plane, dry, driven by hand"
+    assert recording.metadata["driver"]["name"] == "by hand"
+
+
+def test_the_gauges_of_a_car_that_spins_are_those_of_its_recording(tmp_path: Path) -> None:
+    car = drive("slippery", tmp_path, vehicle="bmw_m8", speed_kmh=40.0)
+    car.act(Act(steer=1.0, throttle=1.0))
+    frames = [car.frame().header for _ in range(60)]
+    assert max(abs(frame["sideslip_deg"]) for frame in frames) > 90.0
+    car.end()
+    recording = activesteer.Recording.open(tmp_path / "drive_slippery.mcap")
+    for frame in frames:
+        row = int(np.argmin(np.abs(recording.time_s - frame["time_s"])))
+        speed_kmh = 3.6 * math.hypot(recording["vx_mps"][row], recording["vy_mps"][row])
+        assert abs(frame["speed_kmh"]) == pytest.approx(speed_kmh, abs=0.5)
+        angle_rad = math.atan2(recording["vy_mps"][row], recording["vx_mps"][row])
+        if speed_kmh > 10.0:
+            assert math.cos(angle_rad - math.radians(frame["sideslip_deg"])) > 0.99
 
 
 def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp_path: Path) -> None:
