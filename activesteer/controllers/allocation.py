@@ -1,4 +1,4 @@
-"""Angles of superposition and rear wheels within their limits and rates, for a wanted yaw moment and side force.
+"""Angles of superposition and rear wheels within their limits and rates, for a required yaw moment and side force.
 
 The state feedback of `lqr` wants the angles u_l without limits: a yaw moment M(u_l) and a side force F(u_l), by the
 slopes of the axle curves at the present slip angles. The angles minimise
@@ -168,7 +168,7 @@ def _relieved(
     angle_rad: tuple[float, float],
     ay_mps2: float,
 ) -> float:
-    """Return the superposition angle that relieves front wheels whose force turns the car more than wanted [rad]."""
+    """Return the superposition angle that relieves front wheels whose force turns the car more than required [rad]."""
     front_slip_rad, rear_slip_rad, front, rear = axle_forces(
         block._curves, now, driver_rad + angle_rad[0], angle_rad[1]
     )

@@ -154,7 +154,7 @@ def keys_read(given: Any) -> frozenset[str]:
 
 
 def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
-    """Return the parameters of any controller that overrides can set: key -> default, unit, range and type.
+    """Return default, unit, range and type of each parameter of a controller that overrides can set, by key.
 
     Args:
         given: See `controller_spec`.

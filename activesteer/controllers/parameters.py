@@ -318,7 +318,7 @@ class ControllerSetup:
     battery_power_W: tuple[float, float] = (math.inf, math.inf)
 
     def estimator(self) -> Estimator:
-        """Make an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
+        """Create an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
 
         Raises:
             ControllerError: the vehicle file lacks the table [two_track].

@@ -1,4 +1,4 @@
-"""The human driver, in Python and in compiled code, and how a driver is found by name or as a user's own."""
+"""The human driver, in Python and in compiled code, and the look-up of drivers, including a user's own."""
 
 from __future__ import annotations
 

@@ -216,7 +216,7 @@ class Reply(NamedTuple):
 
 
 class Runs:
-    """Runs for the sliders, with what is worth keeping between two of them."""
+    """Runs for the sliders, with the data that are kept between two runs."""
 
     def __init__(self, folder: Folder) -> None:
         """Start without a run."""

@@ -159,7 +159,7 @@ class Log:
 
 
 def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
-    """Return the chassis of the table, or the rest of the whole car without its other bodies."""
+    """Return the chassis from the table, or the whole car minus all other bodies."""
     table, others = car.table.mass, mass_properties(model, without=["chassis"])
     base = car.wheelbase_m
     if table.chassis_kg is not None and table.chassis_cg is not None:

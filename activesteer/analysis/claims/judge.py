@@ -103,7 +103,7 @@ class Claim:
 
     @property
     def text(self) -> str:
-        """Words of the statement."""
+        """Text of the statement."""
         return self.statement.text
 
 
@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre, whose last row is one step before the end."""
+    """Return whether a run ended before its manoeuvre, allowing for the last row at one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
