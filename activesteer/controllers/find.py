@@ -56,7 +56,7 @@ _MAX_PRESSURE_PA: Final = 1e8
 
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
-    """Controllers, whose torques of the wheels are four numbers in one field."""
+    """Kind of block for controllers, where the torques of the wheels are four numbers in one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
         """Return a command whose other fields are checked too."""

@@ -68,7 +68,7 @@ class Range(NamedTuple):
     most_Nm: float
 
     def largest_Nm(self, side: float) -> float:
-        """Return the largest difference to a side, 1 left or -1 right [Nm]."""
+        """Return the largest difference towards a side, 1 left or -1 right [Nm]."""
         (low_left, low_right), (high_left, high_right) = self.low, self.high
         wide = high_right - low_left if side > 0.0 else high_left - low_right
         return min(max(wide, 0.0), self.most_Nm)

@@ -226,7 +226,7 @@ _MAX_TORQUE_NM: Final = 1e6
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Drivers, whose command is completed by the angle at the road wheel."""
+    """Kind of block for drivers, where a command is completed by the angle at the road wheel."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """Return a command with the angle at the road wheel (see the base class)."""

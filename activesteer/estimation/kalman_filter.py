@@ -116,7 +116,7 @@ def begin(known, memory):
 
 @inlined
 def _step_of(state, place):
-    """Step of a difference, outwards, so that mirrored states have mirrored derivatives."""
+    """Step of a finite difference, away from zero, so that mirrored states have mirrored derivatives."""
     return math.copysign(_DIFFERENCES[place], state[place])
 
 

@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check without changes that a recording can be written, at most over another recording."""
+    """Check without changes that a recording can be written to a path, at most in place of another recording."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)

@@ -130,7 +130,7 @@ def _sweep_responses(sweep: StandardRun) -> Responses:
 
 
 def _random_responses(runs: list[StandardRun]) -> Responses:
-    """Return the responses from the finished runs with random steering, or empty without one."""
+    """Return the responses from the finished runs with random steering, empty if no run has finished."""
     driven = [run for run in runs if run.channels]
     if not driven:
         return {}

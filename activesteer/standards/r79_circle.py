@@ -225,7 +225,7 @@ def _shown(row: Mapping[str, Any], name: str) -> float:
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:
-    """Return the effects of the faults that have one, a row for each: the right circle stands below the left one."""
+    """Return a row for each fault with an effect, with the right circle below the left one."""
     names = _with_effect(faults)
 
     def panel(figure: str, label: str) -> Panel:

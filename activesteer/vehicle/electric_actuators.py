@@ -344,7 +344,7 @@ _LOOSE: Final = ("backlash", "friction_torque", "load_friction", "position_toler
 
 @functools.cache
 def presets_of(kind: type[ElectricActuator]) -> dict[str, dict[str, Any]]:
-    """Return the presets of a kind of actuator: name -> key -> value in SI."""
+    """Return the presets of a kind of actuator, as SI values by name and key."""
     given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
     presets = {
         name: vars(build(kind, {"preset": name, **keys}, source, (kind.TABLE, name)))

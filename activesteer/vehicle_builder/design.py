@@ -55,7 +55,7 @@ class TopMount:
 
 @dataclass
 class Axle:
-    """An axle, complete but for the trim."""
+    """An axle that is complete except for the trim."""
 
     name: str
     kind: AxleKind
@@ -98,7 +98,7 @@ class Axle:
 
 @dataclass
 class CarDesign:
-    """A car, complete but for the trim."""
+    """A car that is complete except for the trim."""
 
     name: str
     table: CarTable

@@ -36,7 +36,7 @@ DIGITS: Final = 4
 
 
 def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bool, Array]]:
-    """Yield the lines of a run, each with whether it is dotted: all but the first of the panel."""
+    """Yield the lines of a run, each with a flag that is set for dotted lines: all but the first of the panel."""
     if panel.extreme is not None:
         yield False, panel.extreme.reduce([recording[line.channel] for line in panel.lines])
         return

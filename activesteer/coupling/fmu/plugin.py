@@ -409,7 +409,7 @@ class Fmu:
         return FmuBlock(self, setup, parameters)
 
     def spec_for(self, setup: Any, parameters: Mapping[str, Any]) -> tuple[Spec, int]:
-        """Return the instance for a run, and the steps of its caller between two steps, with held outputs between."""
+        """Return the instance for a run, and the number of the caller's steps for which its outputs are held."""
         about, every, step_s = self.description, 1, setup.timestep_s
         if self.kind.word == "driver" and self.interval_s is not None:
             every = max(1, round(self.interval_s / step_s))

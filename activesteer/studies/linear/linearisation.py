@@ -482,7 +482,7 @@ def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
 
 
 def _branches(found: Sequence[Sequence[tuple[str, complex]]]) -> list[tuple[str, list[complex]]]:
-    """Return paths of poles from one speed to the next, each with the commonest name that no longer path has."""
+    """Return paths of poles from one speed to the next, each with its commonest name not taken by a longer path."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to import
 
     paths: list[list[tuple[str, complex]]] = []
