@@ -1,4 +1,4 @@
-"""The errors a user of activesteer can meet: one base, one child for each kind of wrong input."""
+"""Errors that a user of activesteer can meet: one base class, and one class for each kind of wrong input."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ActiveSteerError(Exception):
         allowed: Any = None,
         overridden: bool = False,
     ) -> None:
-        """Make the message (see the attributes)."""
+        """Create the message (see the attributes)."""
         where = [f"{file}, line {line}" if line else file] if file and not overridden else []
         if key:
             where.append(f"override {key}" if overridden else key)
@@ -147,7 +147,7 @@ _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 20
 
 
 def _one_line(text: str) -> str:
-    """Replace line breaks by blanks, and what cannot be printed by its escape sequence."""
+    """Replace line breaks by spaces, and unprintable characters by their escape sequences."""
     line = re.sub(r"[ \t]*[\r\n]\s*", " ", _shortened(text.strip(), 4 * _MAX_MESSAGE))
     return _shortened(_printable(line), _MAX_MESSAGE)
 

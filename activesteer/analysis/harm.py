@@ -99,7 +99,7 @@ def failures(recording: Recording) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Describe the requirements that a run with these metrics met, or empty if the manoeuvre has none."""
+    """Yield the requirements that a run with these metrics met, none if the manoeuvre has none."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):

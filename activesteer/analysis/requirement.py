@@ -169,7 +169,7 @@ class Expression:
 
 
 class Requirement(Expression):
-    """A comparison of such numbers, or several, with a margin as its value that is negative if it is violated."""
+    """One comparison or several, whose value is a margin that is negative if it is violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 

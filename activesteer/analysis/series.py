@@ -211,7 +211,7 @@ _AVERAGED_S: Final = 0.1
 
 
 def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """Return the second before the steering wheel turns fast."""
+    """Return the range for zeroing: the second before the steering wheel turns fast."""
     step_s = timestep(time_s)
     width = max(1, round(_AVERAGED_S / step_s))
     rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")

@@ -97,7 +97,7 @@ def steering(recording: RecordingLike) -> Steering:
 
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
-    """Return the times that plots over time mark, with their words.
+    """Return the times that plots over time mark, with their labels.
 
     They are instants of the criterion, phases that begin, or the beginning of braking.
     """

@@ -60,7 +60,7 @@ def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]
 
 
 class _Failures(dict[str, str]):
-    """Label of a failed controller -> message of its error."""
+    """Error messages by the label of the failed controller."""
 
     @contextmanager
     def caught(self, label: str, *, alone: bool) -> Iterator[None]:
@@ -233,7 +233,7 @@ def _paint(
 
 
 def _print_outcomes(recordings: Mapping[str, Any]) -> None:
-    """Print in words for each run a loss of control, or that the car kept its lane."""
+    """Print for each run whether the car lost control or kept its lane."""
     from activesteer.analysis.harm import failures, kept
 
     for label, recording in recordings.items():

@@ -116,7 +116,7 @@ class StopSignals:
             os._exit(128 + number)
 
     def _saved(self, *, in_order: bool) -> str:
-        """Return the files that the command has written, in words."""
+        """Return a text that names the files that the command has written."""
         output: Path | None = getattr(self.options, "output", None)
         own: list[Path] | None = getattr(self.options, "saved", None)
         if own is None:
@@ -143,7 +143,7 @@ def _files(output: Path | None) -> list[Path]:
 
 
 def _part(path: Path, *, in_order: bool) -> str:
-    """Return in words how much of a run a recording holds, or an empty text for a complete one and for other files."""
+    """Return a text on how much of a run a recording holds, empty for a complete run and for other files."""
     if path.suffix != ".mcap":
         return ""
     with path.open("rb") as file:

@@ -25,7 +25,7 @@ class Actuator(NamedTuple):
 
     @property
     def has_torque(self) -> bool:
-        """True for a brake or a motor: its demand is a torque, and it has one stop only."""
+        """True for a brake or a motor, whose demand is a torque and which has only one stop."""
         return self.unit == "Nm"
 
 
@@ -166,7 +166,7 @@ class Fault:
         return f"{self.part}:{self.kind}={value}" if needed == "side" else f"{self.part}:{self.kind}={value:g}{unit}"
 
     def name_at(self, now_s: float) -> str:
-        """Return the name with its time, apart from a start now that has no end."""
+        """Return the name with its time, except for a fault that starts now and has no end."""
         start = "" if self.start_s <= now_s + 1e-9 and self.end_s is None else f"@{self.start_s:g}"
         return f"{self.name}{start}{'' if self.end_s is None else f'-{self.end_s:g}'}"
 

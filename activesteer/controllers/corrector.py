@@ -55,7 +55,7 @@ class Corrector(NativeBlock):
     _filtered_radps: float
 
     def __init__(self, parameters: CorrectorParameters, timestep_s: float) -> None:
-        """Make the feedback of one run.
+        """Create the feedback of one run.
 
         Args:
             parameters: Gains and tolerance band.
@@ -83,7 +83,7 @@ class Corrector(NativeBlock):
         return corrected(self, error_radps, saturated)
 
     def reset(self) -> None:
-        """Reset integral and derivative, as while active steering rests."""
+        """Reset integral and derivative, as while active steering is inactive."""
         reset(self)
 
 

@@ -31,7 +31,7 @@ class Esc:
     gains = EscParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         self._parameters, self._estimator = setup.gains.esc, setup.estimator()
         self._reference = BorneTurnReference(setup.single_track, self._parameters, setup.timestep_s)
         self._yaw_inertia_kgm2, self._levers = setup.single_track.yaw_inertia_kgm2, brake_levers(setup)

@@ -56,7 +56,7 @@ _MAX_PRESSURE_PA: Final = 1e8
 
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
-    """Controllers, whose torques of the wheels are four numbers in one field."""
+    """Kind of block for controllers, where the torques of the wheels are four numbers in one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
         """Return a command whose other fields are checked too."""
@@ -154,7 +154,7 @@ def keys_read(given: Any) -> frozenset[str]:
 
 
 def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
-    """Return the parameters of any controller that overrides can set: key -> default, unit, range and type.
+    """Return default, unit, range and type of each parameter of a controller that overrides can set, by key.
 
     Args:
         given: See `controller_spec`.

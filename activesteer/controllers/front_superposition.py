@@ -34,7 +34,7 @@ class FrontSuperposition(NativeBlock):
     _saturated: int
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         gains, timestep_s = setup.gains, setup.timestep_s
         self._desired = DesiredYawRate(SingleTrack(setup.single_track), gains.desired_yaw_rate, timestep_s)
         self._corrector = Corrector(gains.afs.corrector, timestep_s)

@@ -102,7 +102,7 @@ class SupervisedActuator:
     """
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
-        """Begin with a sound actuator."""
+        """Start with a working actuator."""
         self._tolerance_rad = tolerance_rad
         self._steps = max(1, round(window_s / interval_s))
         self._seen: deque[tuple[float, float]] = deque(maxlen=self._steps + 1)
@@ -146,7 +146,7 @@ class Integrated:
     gains = IntegratedParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         self._lqr = Lqr(setup)
         self._parameters, self._stability, servos = (p := setup.gains.integrated), setup.gains.esc, setup.gains.servos
         self._limits_rad = servos.superposition_limit_rad, servos.rear_limit_rad
@@ -238,7 +238,7 @@ class Integrated:
         )
 
     def _missing_moment(self, now: Estimate, driver_rad: float, ay_mps2: float, steered_Nm: float) -> float:
-        """Return the part of the stability demand that the steering does not give in the time ahead [Nm]."""
+        """Return the part of the stability demand that the steering cannot provide in the time ahead [Nm]."""
         borne = self._borne.borne(driver_rad, now.speed_mps, now.friction, ay_mps2)
         if now.speed_mps < self._stability.least_speed_mps:
             return 0.0

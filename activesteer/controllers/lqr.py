@@ -161,7 +161,7 @@ class Lqr(NativeBlock):
     _rear_before_rad: float
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         p = self._parameters = setup.gains.lqr
         self._servos = setup.gains.servos
         self._estimator = setup.estimator()
@@ -226,7 +226,7 @@ class Lqr(NativeBlock):
         return Turn(now, desired, sideslip, steady, demand, allowed)
 
     def _adapt(self, works: tuple[bool, bool]) -> None:
-        """Take the gains for the actuators that work."""
+        """Select the gains for the actuators that work."""
         rows = schedule(self._car, self._parameters, self._servos.lag_s, self._interval_s, works)
         self._schedule = array("d", chain.from_iterable(rows))
         self._superposition_works, self._rear_works = works
@@ -355,7 +355,7 @@ def fed_back(
 
 @shared
 def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
-    """Return how much the slip angle of soft front tyres exceeds that of soft rear ones, per acceleration [s2 rad/m].
+    """Return the slip angle of soft front tyres less the slip angle of soft rear tyres, per acceleration [s2 rad/m].
 
     It is at least 0, and counts as far as the friction is not `certain`.
     """
@@ -408,7 +408,7 @@ def _steady(
 
 @shared
 def _place(speed_mps: float) -> tuple[int, float]:
-    """Return where the row of the schedule before a speed starts, and the part of the way to the next row."""
+    """Return the start of the schedule row before a speed, and the fraction of the way to the next row."""
     place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(SPEEDS_MPS) - 1 - 1e-6)
     return _ROW * int(place), place - int(place)
 

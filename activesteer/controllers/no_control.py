@@ -17,7 +17,7 @@ class NoControl(NativeBlock):
     _desired: DesiredYawRate
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         self._desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
@@ -40,7 +40,7 @@ class Observer:
     reads = ("estimator",)
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         self._estimator = setup.estimator()
 
     def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:

@@ -130,7 +130,7 @@ class TorqueVectoringParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Brakes for what the steering of `lqr` cannot give (`integrated`), in addition to [controllers.lqr].
+    """Brakes for what the steering of `lqr` cannot provide (`integrated`), in addition to [controllers.lqr].
 
     A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """
@@ -318,7 +318,7 @@ class ControllerSetup:
     battery_power_W: tuple[float, float] = (math.inf, math.inf)
 
     def estimator(self) -> Estimator:
-        """Make an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
+        """Create an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
 
         Raises:
             ControllerError: the vehicle file lacks the table [two_track].

@@ -40,7 +40,7 @@ class RearPrediction(NativeBlock):
     _state_rad: float
 
     def __init__(self, single_track: SingleTrack, timestep_s: float) -> None:
-        """Take the model.
+        """Store the model.
 
         Args:
             single_track: Model for the coefficients.
@@ -87,7 +87,7 @@ class RearSteer(NativeBlock):
     _saturated: int
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         single_track, gains, timestep_s = SingleTrack(setup.single_track), setup.gains, setup.timestep_s
         self._desired = DesiredYawRate(single_track, gains.desired_yaw_rate, timestep_s)
         self._prediction = RearPrediction(single_track, timestep_s)
@@ -128,7 +128,7 @@ class SideslipRearSteer:
     gains = SideslipRearSteerParameters
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Make the controller of one run."""
+        """Create the controller of one run."""
         self._paper, self._estimator = RearSteer(setup), setup.estimator()
         self._sideslip_gain = setup.gains.ars_sideslip.sideslip_gain
         self._limit_rad = setup.gains.ars.limit_rad

@@ -68,7 +68,7 @@ class Range(NamedTuple):
     most_Nm: float
 
     def largest_Nm(self, side: float) -> float:
-        """Return the largest difference to a side, 1 left or -1 right [Nm]."""
+        """Return the largest difference towards a side, 1 left or -1 right [Nm]."""
         (low_left, low_right), (high_left, high_right) = self.low, self.high
         wide = high_right - low_left if side > 0.0 else high_left - low_right
         return min(max(wide, 0.0), self.most_Nm)
@@ -82,7 +82,7 @@ class Range(NamedTuple):
 
 
 def _left_by(slip: float) -> float:
-    """Return the fraction of a torque that a wheel may get which slips in its direction already."""
+    """Return the fraction of a torque that is left for a wheel that already slips in the direction of the torque."""
     return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
 
 
@@ -141,7 +141,7 @@ class SplitTorques:
     def for_moment(
         self, moment_Nm: float, command: DriverCommand, measurement: Measurement, now: Estimate
     ) -> tuple[PerWheel, float]:
-        """Return the torques to add at the wheels for a yaw moment, left positive, and the moment that they make."""
+        """Return the torques to add at the wheels for a yaw moment, left positive, and the moment that they create."""
         ranges, side = self.ranges(command, measurement, now), math.copysign(1.0, moment_Nm)
         possible = sum(each.lever * each.largest_Nm(side) for each in ranges)
         if possible <= 0.0 or moment_Nm == 0.0:

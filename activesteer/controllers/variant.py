@@ -23,7 +23,7 @@ _OWN_KEYS: Final = ("name", "title", "system")
 
 @dataclass(frozen=True, kw_only=True)
 class VariantFile(ControllerParameters):
-    """The keys of a variant file: the table [controllers] of a vehicle file, and these."""
+    """Keys of a variant file, in addition to the table [controllers] of a vehicle file."""
 
     system: str
     """Name of the controller in `CONTROLLERS`."""

@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return in words why there is no answer, or None for an exception that is not the child's."""
+        """Return the reason why there is no answer, or None for an exception that is not the child's."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)

@@ -47,7 +47,7 @@ RUN_DASHES: Final = ((), (7.0, 2.0), (7.0, 1.5, 1.5, 1.5), (3.0, 1.5), (10.0, 3.
 
 
 class RunLook(NamedTuple):
-    """Appearance of a run in all pictures.
+    """Appearance of a run in all figures.
 
     Attributes:
         label: Label of its curve.

@@ -121,7 +121,7 @@ def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
 
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
-    """Return which values are above `MAX_NUMBER`, or above it but finite if `infinite`."""
+    """Return which values are above `MAX_NUMBER`, or only the finite ones of them if `infinite`."""
     # A nan is a missing value, and a run that diverged may hold infinity.
     size = abs(values)
     return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER

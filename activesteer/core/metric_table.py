@@ -61,7 +61,7 @@ class Form(StrEnum):
 
 
 class Metric(NamedTuple):
-    """A declared metric."""
+    """A metric with its display unit, the difference that counts and its preferred direction."""
 
     name: str  # its name in recordings, which ends in its SI unit
     label: str  # its name in words
@@ -78,7 +78,7 @@ class Metric(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Label and unit, as they stand at an axis."""
+        """Label and unit, as shown at an axis."""
         return f"{self.label} [{self.unit.name}]"
 
     @property
@@ -95,7 +95,7 @@ class Metric(NamedTuple):
         return f"{value:z.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:z.3f}"
 
     def cost(self, value: float) -> float:
-        """Return what shall be small [SI], or the value itself if the metric has no preferred direction."""
+        """Return the quantity to minimise [SI], or the value itself if the metric has no preferred direction."""
         if self.better is Better.SMALLER:
             return abs(value)
         return -value if self.better is Better.HIGHER else value

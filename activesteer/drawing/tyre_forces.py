@@ -1,4 +1,4 @@
-"""Tyre forces as arrows on the road, as long on ice as on a dry road."""
+"""Tyre forces as arrows on the road, scaled so that they are as long on ice as on a dry road."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """Write the true angle of a wedge and its side, or empty if the angle is unknown or as good as zero."""
+    """Return the true angle and the side of a wedge as text, empty if the angle is unknown or practically zero."""
     if not abs(angle_rad) >= _NOTHING_RAD:
         return ""
     side = " left" if angle_rad > 0.0 else " right"

@@ -1,4 +1,4 @@
-"""The human driver, in Python and in compiled code, and how a driver is found by name or as a user's own."""
+"""The human driver, in Python and in compiled code, and the look-up of drivers, including a user's own."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ _MAX_TORQUE_NM: Final = 1e6
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Drivers, whose command is completed by the angle at the road wheel."""
+    """Kind of block for drivers, where a command is completed by the angle at the road wheel."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """Return a command with the angle at the road wheel (see the base class)."""

@@ -44,7 +44,7 @@ class SpeedHold(NativeBlock):
     def __init__(
         self, parameters: DriverParameters, drive: Drivetrain, mass_kg: float, wheel_radius_m: float, timestep_s: float
     ) -> None:
-        """Make the speed control of one run."""
+        """Create the speed control of one run."""
         self._gain_Nmspm = parameters.speed_gain_1ps * mass_kg * wheel_radius_m
         self._integral_gain_Nmpm = parameters.speed_integral_gain_1ps2 * mass_kg * wheel_radius_m
         self.drive = drive
@@ -65,7 +65,7 @@ class SpeedHold(NativeBlock):
         return drive_torque(self, speed_demand_mps, measurement.speed_mps, engine_radps, *limits_Nm)
 
     def reset(self) -> None:
-        """Reset the integral, as for a driver who takes the foot off."""
+        """Reset the integral, as when the driver lifts off the accelerator."""
         take_foot_off(self)
 
 
@@ -134,7 +134,7 @@ class OpenLoopDriver(NativeBlock):
         steering_wheel_limit_rad: float,
         rack_per_steering_wheel_m: float | None = None,
     ) -> None:
-        """Make the driver of one run.
+        """Create the driver of one run.
 
         Args:
             speed_hold: The cruise control.
@@ -224,7 +224,7 @@ class ConstantRadiusDriver(NativeBlock):
     _correction_1pm: float
 
     def __init__(self, robot: OpenLoopDriver, wheelbase_m: float, timestep_s: float) -> None:
-        """Make the driver of one run."""
+        """Create the driver of one run."""
         self.robot = robot
         self._wheelbase_m = wheelbase_m
         self._fraction = timestep_s / _TIME_CONSTANT_S

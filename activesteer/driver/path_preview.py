@@ -90,7 +90,7 @@ class PathPreviewDriver(NativeBlock):
     def __init__(
         self, robot: OpenLoopDriver, model: LateralModel, parameters: DriverParameters, timestep_s: float
     ) -> None:
-        """Make the driver of one run.
+        """Create the driver of one run.
 
         Args:
             robot: Driver that limits the steering wheel angle and holds the speed.
@@ -163,7 +163,7 @@ def look(
     block, limit_rad, decided, x, y, yaw, speed, lateral_speed, yaw_rate,
     spacing, xs, ys, heading_first, heading_last, gains,
 ):  # fmt: skip
-    """Look at the path ahead, decide on a steering wheel angle, and take up the next decision that waits.
+    """Look at the path ahead, decide on a steering wheel angle, and apply the next pending decision.
 
     The arguments are: the `PathPreviewDriver`, the lock angle [rad], the earlier decisions, the members of `Motion` and
     of `PathSearch.line`, and `PathPreviewDriver.gains_at` the speed, if the driver looks.

@@ -1,4 +1,4 @@
-"""One step of the estimator, compiled: new samples go into the filters, and the estimate comes from them.
+"""Compiled step of the estimator: update the filters with new samples, and compute the estimate.
 
 The inertial sensors are late by their delay and low-pass. The filters run at the time of the measurement: a buffer
 holds angles, wheel speeds and pressures until then. From there the model alone runs to the present, with the later

@@ -47,7 +47,7 @@ class Estimator(NativeBlock):
     _line: Array
 
     def __init__(self, setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> None:
-        """Make the estimator of one run.
+        """Create the estimator of one run.
 
         Args:
             setup: The known car and its sensors.
@@ -67,7 +67,7 @@ class Estimator(NativeBlock):
 
     @property
     def rate_innovation(self) -> float:
-        """The same of the last measured yaw rate only."""
+        """Squared error of only the last measured yaw rate, over its expected variance."""
         return float(self._memory["rate_innovation"][0])
 
     def step(self, measurement: Measurement) -> Estimate:

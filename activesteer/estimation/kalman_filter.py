@@ -116,7 +116,7 @@ def begin(known, memory):
 
 @inlined
 def _step_of(state, place):
-    """Step of a difference, outwards, so that mirrored states have mirrored derivatives."""
+    """Step of a finite difference, away from zero, so that mirrored states have mirrored derivatives."""
     return math.copysign(_DIFFERENCES[place], state[place])
 
 
@@ -155,7 +155,7 @@ def _differentiate(known, tyres, memory, duration_s, moved, slope):
 
 @compiled
 def _forget(known, memory, duration_s, moved, slope, added):
-    """Return the Gauss-Markov processes towards their means, and add their process noise."""
+    """Relax the Gauss-Markov processes towards their means, and add their process noise."""
     vx_mps = max(memory.speed_mps, SLOWEST_MPS)
     front_rad, rear_rad = slip_angles(known, memory, memory.state, vx_mps)
     toe_rad = known.slip_angle_std_rad + known.slip_angle_braking_s2radpm * abs(memory.ax_mps2)
@@ -248,7 +248,7 @@ def _with_friction(known, tyres, memory, friction):
 
 @compiled
 def _over_friction(known, tyres, memory, here_mps2):
-    """Return slope over the friction, and bend, of the lateral acceleration in the range of its uncertainty."""
+    """Return slope and curvature of the lateral acceleration versus friction, over the range of its uncertainty."""
     kept, spread = memory.state[FRICTION], math.sqrt(3.0 * memory.covariance[FRICTION, FRICTION])
     high, low = min(kept + spread, LARGEST_FRICTION), max(kept - spread, LEAST_FRICTION)
     above_mps2 = _with_friction(known, tyres, memory, high)
@@ -337,7 +337,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
 
 @compiled
 def reopen(known, memory):
-    """Make the friction as unknown as at the start: the car has met another road."""
+    """Reset the uncertainty of the friction to its value at the start, because the car has met another road."""
     covariance = memory.covariance
     for place, size in ((FRICTION, known.friction_std), (REAR_RATIO, _NEW_RATIO_STD)):
         variance = max(covariance[place, place], size * size)

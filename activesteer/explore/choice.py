@@ -42,7 +42,7 @@ class Folder:
     """Names that the page may use: of the package, and files of one folder."""
 
     def __init__(self, path: Path) -> None:
-        """Take the folder."""
+        """Store the folder."""
         self.path = path
 
     def names(self) -> dict[str, list[str]]:

@@ -67,7 +67,7 @@ class HandDriver:
     """
 
     def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
-        """Take the car, with straight wheels and no foot on a pedal."""
+        """Store the car, and start with straight wheels and released pedals."""
         car = setup.single_track
         self.hands, self.hold_mps = Act(steer=0.0), hold_mps
         self._wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
@@ -143,7 +143,7 @@ class DriveSession:
         return np.empty((0, 2)) if course is None else course.cone_centres_m()
 
     def start(self) -> Iterator[Reply]:
-        """Yield the course with the shape of the car, and the picture at the start."""
+        """Yield the course with the shape of the car, and the frame at the start."""
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
@@ -185,7 +185,7 @@ class DriveSession:
         return self._simulation.done
 
     def frame(self) -> Reply:
-        """Wait until the next picture is due, drive to its time, and return it."""
+        """Wait until the next frame is due, drive to its time, and return it."""
         simulation = self._simulation
         until_s = self._pacer.next(simulation.time_s)
         begun_s = time.perf_counter()
@@ -222,7 +222,7 @@ class DriveSession:
         return Reply(header, (poses.astype(np.float32),))
 
     def _hit_cones(self) -> list[int]:
-        """Return the cones that the body has hit since the last picture, by their numbers."""
+        """Return the cones that the body has hit since the last frame, by their numbers."""
         motion, size, cones = self._simulation.motion, self._size, self._cones()
         if not len(cones):
             return []

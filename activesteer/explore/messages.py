@@ -36,11 +36,11 @@ class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_
 
 
 class Describe(Choice, frozen=True, tag="describe"):
-    """The page asks for the sliders and the car of a choice."""
+    """Request of the page for the sliders and the car of a choice."""
 
 
 class RunRequest(Choice, frozen=True, tag="run"):
-    """The page asks for runs."""
+    """Request of the page for runs."""
 
     dragging: bool = False  # whether a slider is being moved: the amplitude of the steering wheel is then held
     values: Annotated[dict[_Name, float], Meta(max_length=_MAX_NUMBERS)] = {}  # key of a slider -> value
@@ -69,11 +69,11 @@ class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_fie
 
 
 class Save(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="save"):
-    """The page asks to write the last runs as recordings."""
+    """Request of the page to write the last runs as recordings."""
 
 
 class Report(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="report"):
-    """The page asks for a report of the last runs."""
+    """Request of the page for a report of the last runs."""
 
 
 class End(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="end"):

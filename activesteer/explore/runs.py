@@ -130,7 +130,7 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
 
 
 def _moves(scenario: Scenario, key: str, value: Any) -> bool:
-    """Return whether a slider of a key with a value does anything: `road.mu` does not on a road of two sides."""
+    """Return whether a slider of a key has an effect at a value: `road.mu` has none on a road with two sides."""
     owner, _, name = key.rpartition(".")
     return _is_number(value) and not (owner and is_overruled(value_of(scenario, owner), name))
 
@@ -219,7 +219,7 @@ class Reply(NamedTuple):
 
 
 class Runs:
-    """Runs for the sliders, with what is worth keeping between two of them."""
+    """Runs for the sliders, with the data that are kept between two runs."""
 
     def __init__(self, folder: Folder) -> None:
         """Start without a run."""

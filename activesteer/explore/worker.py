@@ -1,4 +1,4 @@
-"""The worker process of the page: one thread that drives, told by messages through a pipe.
+"""The worker process of the page: one thread that drives, controlled by messages through a pipe.
 
 A new choice drops the runs of an older one. Any error, also one of own code, becomes a message to the page; the process
 goes on.
@@ -134,7 +134,7 @@ def _error(error: BaseException, message: Message) -> Reply:
 
 
 def _words(error: BaseException) -> str:
-    """Return the message of errors of this package, and the class and message of others."""
+    """Return the message of an error of this package, or the class and message of any other error."""
     if isinstance(error, ActiveSteerError):
         return str(error)
     try:

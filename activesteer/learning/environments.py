@@ -104,7 +104,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         )  # fmt: skip
 
     def render(self) -> Any:
-        """Return a picture, shape (height, width, 3), or show it in MuJoCo's viewer."""
+        """Return an image, shape (height, width, 3), or show it in MuJoCo's viewer."""
         if self.render_mode is None:
             return None
         loop = self.episodes.loop(0)

@@ -268,7 +268,7 @@ class Episodes:
 
     @property
     def active(self) -> NDArray[np.intp]:
-        """Number of the car, of those that an episode has, that drives in each episode."""
+        """Number of the car that drives in each episode, among the cars of that episode."""
         return self._active % self._cars
 
     def loop(self, episode: int) -> Any:

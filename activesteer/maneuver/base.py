@@ -43,7 +43,7 @@ class NamedFile(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Maneuver(ABC):
-    """Base of all kinds.
+    """Base of all kinds of manoeuvres.
 
     The fields are the keys of the TOML file.
 
@@ -79,7 +79,7 @@ class Maneuver(ABC):
     """Keys of this kind that name files."""
 
     def __init_subclass__(cls, kind: str = "") -> None:
-        """Enter a kind into the table of kinds."""
+        """Register a kind in the table of kinds."""
         if kind:
             KINDS[kind] = cls
 

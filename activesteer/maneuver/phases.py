@@ -96,7 +96,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase, with None for what it leaves as it is."""
+    """One phase, with None for each input that it leaves unchanged."""
 
     name: str
     """Name, for the events in the recording."""
@@ -124,7 +124,7 @@ class Phase:
     """End of the phase. Default: when steering wheel, speed demand and pedal have reached their values."""
 
     def __post_init__(self) -> None:
-        """Check that no key lacks an effect."""
+        """Check that every key has an effect."""
         turns = self.steering_wheel_rad is not None or self.steering_factor is not None
         for key, given, beside, needed in (
             ("steering_factor", self.steering_factor is not None, self.steering_wheel_rad is None,
@@ -141,7 +141,7 @@ class Phase:
 
 @dataclass(frozen=True, kw_only=True)
 class Phases(Maneuver, kind="phases"):
-    """Phases in a row, the last one to the end of the run."""
+    """Phases that follow each other, the last one to the end of the run."""
 
     phases: tuple[Phase, ...]
     """The phases."""

@@ -216,7 +216,7 @@ class Compared(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """True if enough samples are inside."""
+        """True if enough samples are inside the corridor."""
         return self.share_inside >= SHARE_NEEDED
 
     def to_json(self) -> dict[str, Any]:
@@ -245,7 +245,7 @@ class Comparison(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """True if every channel is inside."""
+        """True if every channel is inside its corridor."""
         return all(quantity.inside for quantity in self.quantities)
 
     def to_json(self) -> dict[str, Any]:

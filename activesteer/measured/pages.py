@@ -1,4 +1,4 @@
-"""Comparisons with measured runs, and fits, as pages made to be printed."""
+"""Comparisons with measured runs, and fits, as printable pages."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _cells(found: Compared) -> tuple[Text, ...]:
 
 
 def _shift(shift_s: float) -> str:
-    """Return in words how much later a measured run is."""
+    """Return a text on the delay of a measured run."""
     if math.isnan(shift_s):
         return "by an unknown time later"
     return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0.0 else 'later'}"
@@ -251,7 +251,7 @@ def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
 
 
 def overrides_text(found: Fit, name: str) -> str:
-    """The file for `--overrides`: what holds in all recordings, and as comments what belongs to one of them."""
+    """Return the file for `--overrides`: values that hold in all recordings, and as comments those of only one."""
     words = {one.key: one.words if one.value == found.overrides.get(one.key) else f"{one.words}, relative to the files"
              for one in found.parameters}  # fmt: skip
     lines = [f"# Found by `activesteer fit {name}.toml`; for --overrides, or the table [overrides] of a study."]

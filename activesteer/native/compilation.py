@@ -227,7 +227,7 @@ def _sources_key(source: Path) -> str:
 
 
 def processor() -> str:
-    """Return what decides the last digits of results: the processor, as the compiler, numpy and the BLAS see it."""
+    """Return the processor as the compiler, NumPy and the BLAS see it, which decides the last digits of results."""
     compiler = [getattr(config, "CPU_NAME", None) or get_host_cpu_name(), getattr(config, "CPU_FEATURES", None)]
     libraries = [os.environ.get(name, "") for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")]
     return repr(compiler + libraries)

@@ -58,7 +58,7 @@ def wedges_path(run: ReplayedRun) -> str:
 
 
 def plan_view(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
-    """Return the view of the plans of these runs."""
+    """Return the view with the plan drawings of these runs."""
     found = [footprint_of(run.recording.metadata) or Footprint() for run in runs]
     front = max(size.front_m for size in found) + 1.9
     rear = min(size.rear_m for size in found) - 1.2

@@ -96,7 +96,7 @@ class _Uncached(SourceFileLoader):
 
 
 class _Neighbours:
-    """Finder of the modules next to users' files: folder -> names of the modules that are imported from it."""
+    """Finder of the modules next to users' files, with the names of the imported modules by folder."""
 
     folders: ClassVar[dict[str, frozenset[str]]] = {}
 

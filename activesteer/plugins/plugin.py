@@ -39,7 +39,7 @@ class Declared(NamedTuple):
 
 
 def declared_by(origin: Any) -> dict[str, Declared]:
-    """Return the parameters of a class or function: name -> declaration.
+    """Return the declared parameters of a class or function by name.
 
     They are the arguments of `from_vehicle`, else of the constructor, without `setup`. An annotation
     `Annotated[float, Range(0.0, 2.0), "rad/rad"]` gives range and unit, and so does an entry of the attribute
@@ -64,7 +64,7 @@ def declared_by(origin: Any) -> dict[str, Declared]:
 
 
 def declared_in(table: Any, keys: Collection[str], prefix: str) -> dict[str, Declared]:
-    """Return the values of a dataclass and of its tables as declared parameters: dotted key -> declaration."""
+    """Return the values of a dataclass and of its tables as declared parameters, by dotted key."""
     found: dict[str, Declared] = {}
     for name, annotation in typing.get_type_hints(type(table), include_extras=True).items():
         value = getattr(table, name)
@@ -176,7 +176,7 @@ class Plugin:
 
     @functools.cached_property
     def declared(self) -> dict[str, Declared]:
-        """Parameters of a user's block: name -> declaration.
+        """Declared parameters of a user's block by name.
 
         An object has none, because it exists already.
 

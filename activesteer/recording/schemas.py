@@ -99,7 +99,7 @@ class FixedMessage:
         return self.raw(dtype)
 
     def raw(self, dtype: str) -> FixedMessage:
-        """Append an untagged number, to the last run if the distance is the same."""
+        """Append an untagged number, which extends the last run if the distance is the same."""
         offset = len(self.template)
         if self.runs:
             last = self.runs[-1]

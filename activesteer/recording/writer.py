@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check without changes that a recording can be written, at most over another recording."""
+    """Check without changes that a recording can be written to a path, at most in place of another recording."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
@@ -224,7 +224,7 @@ class McapWriter:
         positions_m: ArrayLike = (),
         quaternions: ArrayLike = (),
     ) -> None:
-        """Write a block, best of about one simulated second.
+        """Write a block, preferably of about one simulated second.
 
         The arrays may be reused after the call.
 
@@ -358,7 +358,7 @@ class McapWriter:
             error.add_note(f"The recording could not be ended properly either: {second}")
 
     def _await(self, maximum: int) -> None:
-        """Wait until at most `maximum` blocks are being written, and raise an error of their writing."""
+        """Wait until at most `maximum` blocks are being written, and raise any error of writing them."""
         while len(self._pending) > maximum:
             end_ns, future = self._pending[0]
             try:

@@ -107,7 +107,7 @@ def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
 
 
 def _split(content: bytes) -> tuple[dict[str, list[str]], bytes]:
-    """Split a file into the blocks of its header, block -> its lines, and its data."""
+    """Split a file into its header, as lines by block, and its data."""
     end = re.search(rb"^\$\$\$\$[^\r\n]*\r?\n", content, re.MULTILINE)
     head = content[: end.start()] if end else content
     blocks: dict[str, list[str]] = {}

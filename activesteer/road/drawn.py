@@ -31,7 +31,7 @@ class DrawnSurface(NamedTuple):
 
     @property
     def plane_below_m(self) -> float:
-        """Height of a plane below all of it, to be drawn around it [m]."""
+        """Height of the plane that is drawn around the surface, below all of it [m]."""
         return min(0.0, float(self.z_m.min())) - 0.02
 
     def to_table(self) -> dict[str, Any]:

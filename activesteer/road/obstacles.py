@@ -152,7 +152,7 @@ class Obstacle:
 
     @property
     def is_smooth(self) -> bool:
-        """True if the obstacle hardly bends within the contact patch, so that one point of contact tells enough."""
+        """True if the obstacle hardly bends within the contact patch, so that one point of contact is enough."""
         return _SHAPES[self.kind] != PLATEAU and self.length_m is not None and self.length_m >= _LONG_M
 
     def record(self) -> Any:

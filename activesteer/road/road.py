@@ -171,7 +171,7 @@ class Road:
     """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
     def __post_init__(self) -> None:
-        """Check that no key is without effect."""
+        """Check that every key has an effect."""
         split = self.patches or self.mu_left is not None or self.mu_right is not None
         if self.along == "path" and not split and not self.is_uneven:
             raise ManeuverError("'path' has no effect without patches, mu_left, mu_right or a surface", key="along")
@@ -197,7 +197,7 @@ class Road:
 
     @property
     def is_uneven(self) -> bool:
-        """True if the road has a surface besides its plane."""
+        """True if the road has a surface in addition to its plane."""
         return bool(self.obstacle) or self.banking is not None or self._is_gridded
 
     @property

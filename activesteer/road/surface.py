@@ -276,7 +276,7 @@ def surface_of(road: Road) -> Surface:
 
 
 def _rises(grid: Grid) -> Array:
-    """Return the largest difference of height [m] in the reach of a tyre, for each stretch of `_REACH_M`."""
+    """Return the largest height difference [m] within the reach of a tyre, for each stretch of `_REACH_M`."""
     per = max(1, int(_REACH_M // grid.step_s_m))
     count = -(-len(grid.z_m) // per)
     padded = np.pad(grid.z_m, ((0, count * per - len(grid.z_m)), (0, 0)), "edge").reshape(count, per, -1)

@@ -79,7 +79,7 @@ def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
 
 
 def own_values(overrides: Sequence[Override], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
-    """Return the checked overrides of users' controllers: class -> name -> value."""
+    """Return the checked overrides of users' controllers, as values by class and name."""
     given: dict[str, dict[str, Any]] = {}
     for _, (name, parameter), value in overrides:
         given.setdefault(name, {})[parameter] = value
@@ -87,7 +87,7 @@ def own_values(overrides: Sequence[Override], controllers: Mapping[str, Sequence
 
 
 def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Return the overrides of the table [controllers]: key -> names of the fields on the path to its value."""
+    """Return the overrides of the table [controllers] by key, each as the path of field names to its value."""
     split = {key: key.removeprefix("vehicle.").split(".") for key in overrides if own_path(key) is None}
     return {
         key: field_path(ControllerParameters, rest) for key, (first, *rest) in split.items() if first == "controllers"
@@ -95,7 +95,7 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
-    """Return the overrides that none of these controllers reads: key -> keys of the table [controllers] it replaces."""
+    """Return the overrides that none of these controllers reads, each with the [controllers] keys that it replaces."""
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
         key: _BUILT_IN.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))

@@ -386,7 +386,7 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
 
 
 def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
-    """Give a manoeuvre the very course of another one, so that a driver stays on his path, and return it."""
+    """Give a manoeuvre the same course object as another one, so that a driver stays on his path, and return it."""
     if before.course is not None:
         vars(after)["course"] = before.course
     return after

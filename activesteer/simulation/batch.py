@@ -173,7 +173,7 @@ class Batch(Copyable):
 
     @property
     def time_s(self) -> Array:
-        """Present time of each car, from the start of the manoeuvre [s]."""
+        """Current time of each car, from the start of the manoeuvre [s]."""
         return self._records["step"] * self._timestep_s
 
     @property
@@ -324,7 +324,7 @@ class Batch(Copyable):
             return [self.loops[car].save_state() for car in np.flatnonzero(self._mask(cars)).tolist()]
 
     def restore_state(self, states: Sequence[LoopState], cars: ArrayLike | None = None) -> None:
-        """Bring some cars back to saved states of themselves, or of cars with the same inputs.
+        """Restore saved states of some cars, or of cars with the same inputs.
 
         Args:
             states: A state for each of these cars, in the order of their numbers.
@@ -343,7 +343,7 @@ class Batch(Copyable):
                 self.failures.pop(car, None)
 
     def reset(self, cars: ArrayLike | None = None) -> Any:
-        """Bring some cars back to the start of their manoeuvre, and return the measurement of all.
+        """Reset some cars to the start of their manoeuvre, and return the measurement of all.
 
         Args:
             cars: Numbers of the cars, or a mask; by default all.

@@ -65,11 +65,11 @@ class NonReentrantLock:
     """A context that a second caller cannot enter while the first is inside."""
 
     def __init__(self) -> None:
-        """Make a context that nobody has entered."""
+        """Create a context that is free to enter."""
         self._lock = threading.Lock()
 
     def __enter__(self) -> None:
-        """Enter, or refuse."""
+        """Enter, or raise an error while another caller is inside."""
         if not self._lock.acquire(False):
             raise ManeuverError(
                 "this simulation is already being driven, by another thread or by the caller of its own block; use a "
@@ -198,7 +198,7 @@ class ClosedLoop(Uncopyable):
         )
 
     def _connect(self) -> None:
-        """Connect a new controller with its bus, on which nothing is yet."""
+        """Connect a new controller to its bus, which is empty."""
         record, unit = self._record, self.unit
         self._bus = np.zeros((unit.delay + 1, N_HELD))
         record["bus"]["address"], record["bus"]["size"] = self._bus.ctypes.data, self._bus.size
@@ -355,7 +355,7 @@ class ClosedLoop(Uncopyable):
         self.advance(self.steps - self.step_count, recorder)
 
     def advance(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
-        """Drive some steps.
+        """Drive a number of steps.
 
         Args:
             steps: Number of steps.
@@ -372,7 +372,7 @@ class ClosedLoop(Uncopyable):
             self.drive(steps, recorder, given)
 
     def drive(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
-        """Drive some steps inside `in_use` (see `advance`)."""
+        """Drive a number of steps inside `in_use` (see `advance`)."""
         vehicle, record = self.vehicle, self._record
         driver_command, actuator_command = given
         if driver_command is not None:
@@ -481,7 +481,7 @@ class ClosedLoop(Uncopyable):
             self._record["torques_Nm"] = torque_numbers(torques)
 
     def _give_actuator_command(self, command: Any) -> None:
-        """Let the car have a command that reaches its actuators at once."""
+        """Pass the car a command that reaches its actuators immediately."""
         write_command(ActuatorCommand, self._actuator_at, command)
         self._check_driven(command)
         if command.estimate is not None:

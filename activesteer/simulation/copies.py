@@ -1,4 +1,4 @@
-"""Base of what runs and can be copied: one mechanism for copy, deepcopy and pickle, by inputs and state."""
+"""Base of objects that run and can be copied: one mechanism for copy, deepcopy and pickle, by inputs and state."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from activesteer.plugins import in_one_line, is_user_module
 
 
 class Copyable:
-    """Base of what is copied as its inputs and its state, and built again from them."""
+    """Base of objects that are copied as inputs and state, and built again from them."""
 
     def _portable(self) -> Any:
         """Return inputs and state, without native memory."""
         raise NotImplementedError
 
     def _rebuild(self, portable: Any) -> None:
-        """Become what `_portable` describes."""
+        """Restore the object that `_portable` describes."""
         raise NotImplementedError
 
     @classmethod

@@ -51,22 +51,22 @@ class FramePacer:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
-        """Take a clock, which starts with the first picture."""
+        """Store a clock, which starts with the first frame."""
         self.speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
 
     def change_speed(self, factor: float) -> None:
-        """Change the speed by a factor, from the next picture on."""
+        """Change the speed by a factor, from the next frame on."""
         self.speed, self._start_s = min(max(self.speed * factor, _SLOWEST), _FASTEST), None
 
     def wait(self) -> None:
-        """Wait for the time of one picture without simulated time."""
+        """Wait for the duration of one frame without simulated time."""
         self._sleep(FRAME_S)
         self._start_s = None
 
     def next(self, shown_s: float) -> float:
-        """Wait until the next picture is due."""
+        """Wait until the next frame is due."""
         now_s = self._clock()
         if self._start_s is None:
             self._start_s = now_s - shown_s / self.speed
@@ -96,7 +96,7 @@ class Keys:
         self.faster = 1.0
 
     def __call__(self, code: int) -> None:
-        """Take a key of ours, by the code of GLFW, which is the upper-case letter."""
+        """Handle one of our keys, given by its GLFW code, which is the upper-case letter."""
         if code == ord(" "):
             self.paused = not self.paused
         elif code == ord("R"):

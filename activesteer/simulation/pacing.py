@@ -1,4 +1,4 @@
-"""Pace of a run by the clock: each step begins at its own time, and how late it began is kept."""
+"""Pace of a run by the clock: each step begins at its own time, and its delay is kept."""
 
 from __future__ import annotations
 

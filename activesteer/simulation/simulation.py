@@ -50,7 +50,7 @@ class Link(Protocol):
     report: dict[str, int]
 
     def connect(self, check: Callable[[Given, str], Given]) -> None:
-        """Receive the function that checks and completes commands, and whose errors name their giver."""
+        """Receive the function that checks and completes commands, with errors that name the source of a command."""
 
     def commands(self) -> Given:
         """Return the commands for the next step, or None where the run's own block decides."""
@@ -155,7 +155,7 @@ class Simulation(Copyable):
 
     @property
     def time_s(self) -> float:
-        """Present time, from the start of the recording [s]."""
+        """Current time, from the start of the recording [s]."""
         return self.loop.step_count * self.loop.vehicle.timestep_s
 
     @property
@@ -165,7 +165,7 @@ class Simulation(Copyable):
 
     @property
     def setpoint(self) -> Setpoint:
-        """Present demand of the manoeuvre on the driver."""
+        """Current demand of the manoeuvre on the driver."""
         sequence = self.loop.sequence
         return self.loop.maneuver.setpoint(self.time_s) if sequence is None else sequence.present
 
@@ -198,7 +198,7 @@ class Simulation(Copyable):
     def advance(
         self, steps: int, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
-        """Drive some steps.
+        """Drive a number of steps.
 
         If you supply a command, the block it replaces is not called and its state is frozen.
 
@@ -459,7 +459,7 @@ class Simulation(Copyable):
             yield
 
     def end_file(self, recording: Recording) -> None:
-        """Write outcome and metrics of the run behind the rows of its file, if there is a file."""
+        """Write outcome and metrics of the run at the end of its file, if there is a file."""
         if self._writer is not None:
             known = self.context.metadata
             outcome = {key: value for key, value in recording.metadata.items() if key not in known}

@@ -47,7 +47,7 @@ def amplitudes(a_deg: float) -> list[tuple[float, float]]:
 
 
 def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
-    """Describe the limits that a run breaks, with the required displacement [m], or empty if it keeps them."""
+    """Return descriptions of the limits that a run exceeds, for a required displacement [m], empty if it keeps them."""
     broken = [
         f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
         for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)

@@ -154,7 +154,7 @@ def _weave(angle_deg: float) -> dict[str, Any]:
 
 
 def _through_centre(runs: list[StandardRun]) -> dict[str, Array]:
-    """Join both transitions from the right to the left, up to the wanted lateral acceleration."""
+    """Join both transitions from the right to the left, up to the required lateral acceleration."""
     left, right = ({name: run[name] for name in _CHANNELS} for run in runs)
     ends = [int(np.argmax(np.abs(side["ay_mps2"]) >= AY_MPS2)) or len(side["ay_mps2"]) for side in (left, right)]
     return {name: np.concatenate([right[name][: ends[1]][::-1], left[name][: ends[0]]]) for name in _CHANNELS}

@@ -70,7 +70,7 @@ class Reached(NamedTuple):
 
 
 def reached(run: StandardRun, radius_m: float) -> Reached:
-    """Return time and force to reach a radius of the centre of gravity's path [m] in a spiral from `_BEGIN_S` on."""
+    """Return the time from `_BEGIN_S` until a spiral reaches a path radius [m], and the largest rim force."""
     if not run.channels:
         return Reached(math.nan, math.nan)
     tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]
@@ -225,7 +225,7 @@ def _shown(row: Mapping[str, Any], name: str) -> float:
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:
-    """Return the effects of the faults that have one, a row for each: the right circle stands below the left one."""
+    """Return a row for each fault with an effect, with the right circle below the left one."""
     names = _with_effect(faults)
 
     def panel(figure: str, label: str) -> Panel:

@@ -136,7 +136,7 @@ class _KeptInputs:
 
 
 class _Nothing:
-    """Controller of a user who does nothing."""
+    """A user's controller that does nothing."""
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         return ActuatorCommand()

@@ -54,7 +54,7 @@ class Reproduction:
         return 1 if self.failures else self.scorecard.exit_status
 
     def recordings(self) -> dict[str, dict[str, Recording]]:
-        """Return the complete runs, opened: scenario -> system -> recording."""
+        """Return the complete runs, opened, by scenario and system."""
         return {
             scenario: {system: Recording.open(path) for system, path in systems.items()}
             for scenario, systems in self.paths.items()

@@ -193,7 +193,7 @@ class Vehicle(Uncopyable):
 
     @property
     def wheel_radius_m(self) -> float:
-        """Present height of the driven wheels' centres, mean weighted by their fractions of the torque [m]."""
+        """Current height of the driven wheels' centres, mean weighted by their fractions of the torque [m]."""
         fractions = self.parameters.powertrain.wheel_fractions
         return sum(part * height for part, height in zip(fractions, self.wheels.heights_m().tolist(), strict=True))
 
@@ -262,7 +262,7 @@ class Vehicle(Uncopyable):
 
     @property
     def gear(self) -> float:
-        """Present gear."""
+        """Current gear."""
         return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:

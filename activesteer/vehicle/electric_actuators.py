@@ -308,12 +308,12 @@ class ElectricActuator:
         return self.preset != self.MODEL
 
     def resolved(self) -> Self:
-        """Return it with the preset's value for every missing key."""
+        """Return the actuator with the preset's value for every missing key."""
         preset = presets_of(type(self))[self.preset]
         return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
 
     def smooth(self) -> Self:
-        """Return it without play, dry friction and tolerance of the position, within which slopes mean nothing."""
+        """Return the actuator without play, dry friction and position tolerance, within which slopes mean nothing."""
         loose = [item.name for item in fields(self) if item.name.startswith(_LOOSE)]
         return replace(self, **dict.fromkeys(loose, 0.0)) if self.has_motor else self
 
@@ -344,7 +344,7 @@ _LOOSE: Final = ("backlash", "friction_torque", "load_friction", "position_toler
 
 @functools.cache
 def presets_of(kind: type[ElectricActuator]) -> dict[str, dict[str, Any]]:
-    """Return the presets of a kind of actuator: name -> key -> value in SI."""
+    """Return the presets of a kind of actuator, as SI values by name and key."""
     given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
     presets = {
         name: vars(build(kind, {"preset": name, **keys}, source, (kind.TABLE, name)))

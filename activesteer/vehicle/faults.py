@@ -79,7 +79,7 @@ class Faults:
         self._vehicle.act_in_every_step(None)
 
     def take_memory_of(self, other: Faults) -> None:
-        """Take over the memory of faults that stand first here too, and so go on."""
+        """Take over the memory of faults that are also first here, so that they continue."""
         for acting, before in zip(self._acting, other._acting, strict=False):
             acting.memory[:] = before.memory
 
@@ -114,7 +114,7 @@ class _Acting:
 
     @property
     def state(self) -> int:
-        """Present action of the fault in compiled code (see `set_fault`)."""
+        """Current action of the fault in compiled code (see `set_fault`)."""
         return int(self._own["state"])
 
     def bind(self, record: Any) -> None:

@@ -292,7 +292,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return one record, shape (1,), 0 where nothing is given, also behind a row shorter than its field."""
+    """Return one record, shape (1,), with 0 for numbers that are not given, also beyond the end of a short row."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:
@@ -326,7 +326,7 @@ def header_of(model: mujoco.MjModel) -> NDArray[Any]:
 
 
 def section_of(model: mujoco.MjModel, name: str) -> NDArray[Any]:
-    """Return the records of a section of one of our models, a view too."""
+    """Return the records of a section of one of our models, as a view."""
     header = header_of(model)[0]
     return _view(model, int(header[name]), np.dtype(_SECTIONS[name]), int(header[f"n_{name}"]))
 

@@ -262,7 +262,7 @@ class ImplicitPlan:
         return {"plan": self.plan, **{f"plan_{name}": part for name, part in zip(names, self._memory, strict=True)}}
 
     def _freeze(self) -> None:
-        """Keep a copy of what the plan was made from."""
+        """Keep a copy of the data from which the plan was made."""
         model = self._model
         self._settings = self._current_settings()
         self._copies = [getattr(model, name).copy() for name in ARRAYS]
@@ -278,7 +278,7 @@ class ImplicitPlan:
         return (*_options(self._model.opt), mujoco.get_mjcb_control())
 
     def follow(self) -> None:
-        """Plan again if the model has changed in what the plan has frozen.
+        """Plan again if data of the model that the plan has frozen have changed.
 
         This takes two microseconds if nothing has changed. All other changes count in each step anyway.
         """

@@ -182,7 +182,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Add to drive, brakes, friction and servos what MJCF lacks, with forces by the activation at a step's end."""
+    """Add what MJCF lacks to drive, brakes, friction and servos, with forces by the activation at the end of a step."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER

@@ -81,7 +81,7 @@ class Tape:
     """
 
     def __init__(self) -> None:
-        """Create a tape without room."""
+        """Create a tape without capacity."""
         self.record = np.zeros(1, TAPE)
         self.address = self.record.ctypes.data
         self.memory: Any = None
@@ -158,7 +158,7 @@ def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
 
 
 def command_channels(numbers: Mapping[str, Number]) -> dict[Channel, int]:
-    """Channels of the numbers that are recorded -> their places in a row."""
+    """Places of the recorded numbers in a row, by channel."""
     return {
         Channel(name, number.recorded.unit, number.recorded.meaning, "control"): place
         for place, (name, number) in enumerate(numbers.items())
@@ -287,7 +287,7 @@ class WheelSet:
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, parameters: VehicleParameters) -> None:
-        """Look the wheels up."""
+        """Look up the wheels."""
 
         def found(kind: mujoco.mjtObj, ending: str) -> list[int]:
             return [find(model, kind, corner + ending) for corner in CORNERS]
@@ -326,7 +326,7 @@ class WheelSet:
                 )
 
     def apply(self, torques: WheelTorques) -> None:
-        """Set the torques of single wheels, at once and without the limits of the engine."""
+        """Set the torques of single wheels, immediately and without the limits of the engine."""
         numbers = torque_numbers(torques)
         self._ctrl[self.bound["drives"]], self._ctrl[self.bound["brakes"]] = numbers[:4], numbers[4:]
 

@@ -65,7 +65,7 @@ class AxleKind:
 
     @property
     def arms(self) -> dict[str, tuple[Sequence[str], str]]:
-        """Swinging parts: name -> inner points (one or two) and outer point."""
+        """Swinging parts by name, each with its inner points (one or two) and its outer point."""
         arms = {}
         for name, inner in self.carriers.items():
             if inner:

@@ -72,7 +72,7 @@ def new_vehicle(
     kc: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
 ) -> NewVehicle:
-    """Make a car from a table of hardpoints, masses, springs and bushings, or from measurements of a K&C rig.
+    """Create a car from a table of hardpoints, masses, springs and bushings, or from measurements of a K&C rig.
 
     Examples:
         >>> from activesteer.resources import models_dir
@@ -128,7 +128,7 @@ def new_vehicle(
 
 
 def _install(files: Path, target: Path) -> None:
-    """Copy files into a folder that appears complete: a full disk leaves nothing."""
+    """Copy files into a folder that appears only when it is complete, so that a full disk leaves nothing."""
     part = target.with_name(f".{target.name}-{secrets.token_hex(4)}.part")
     with writing(target, ParameterError):
         try:

@@ -140,7 +140,7 @@ def complete(
     log: Log,
     tables: KcTables | None = None,
 ) -> CarDesign:
-    """Make a car from a table in vehicle coordinates."""
+    """Create a car from a table in vehicle coordinates."""
     steering, brakes = table.steering, table.brakes
     column_Npm = log.take("steering", steering, "column_stiffness_Npm", 4e6, "the compact's: torsion bar and assist")
     servo_Nmprad = table.rear_steering.stiffness_Nmprad or _SERVO_NMPRAD

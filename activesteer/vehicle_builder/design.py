@@ -55,7 +55,7 @@ class TopMount:
 
 @dataclass
 class Axle:
-    """An axle, complete but for the trim."""
+    """An axle that is complete except for the trim."""
 
     name: str
     kind: AxleKind
@@ -98,7 +98,7 @@ class Axle:
 
 @dataclass
 class CarDesign:
-    """A car, complete but for the trim."""
+    """A car that is complete except for the trim."""
 
     name: str
     table: CarTable
@@ -159,7 +159,7 @@ class Log:
 
 
 def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
-    """Return the chassis of the table, or the rest of the whole car without its other bodies."""
+    """Return the chassis from the table, or the whole car minus all other bodies."""
     table, others = car.table.mass, mass_properties(model, without=["chassis"])
     base = car.wheelbase_m
     if table.chassis_kg is not None and table.chassis_cg is not None:

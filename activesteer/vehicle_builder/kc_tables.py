@@ -89,7 +89,7 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
 
 @dataclass(frozen=True)
 class KcTables:
-    """All tests of a car (axle -> test -> samples), and the ratio of its steering if measured."""
+    """All tests of a car, as samples by axle and test, and its steering ratio if measured."""
 
     tests: dict[str, dict[str, Samples]] = field(default_factory=dict)
     rack_per_steering_wheel_m: float | None = None  # rack travel per angle of the steering wheel [m/rad]

@@ -74,7 +74,7 @@ class Gauges:
             self._readings.pop()
 
     def _largest_scale(self) -> float:
-        """Set and return the largest scale with room for rows in panes, and for texts in their share."""
+        """Set and return the largest scale at which rows fit into panes, and texts into their share of the frame."""
         width, high = self._size[0] / len(self._panes), self._size[1] / 480.0
         scale = max(min(high, math.sqrt(width / 640.0 * high)), _LEGIBLE)
         most = LARGEST_SHARE * self._size[0] * self._size[1]
@@ -128,7 +128,7 @@ class Gauges:
 
 
 class LargeSideslip:
-    """Name and sideslip angle of each run, legible in a small picture."""
+    """Name and sideslip angle of each run, legible in a small image."""
 
     def __init__(self, panes: Dialled, size: tuple[int, int]) -> None:
         """Choose the fonts."""

@@ -193,7 +193,7 @@ def _add_solid(body: mujoco.MjsBody, solid: Primitive, car: FilmedCar) -> None:
 
 
 def _add_shadow_material(spec: mujoco.MjSpec) -> None:
-    """Add the black of the shadows, opaque in the middle and transparent at the edges."""
+    """Add the material of the shadows: black, opaque in the middle and transparent at the edges."""
     away = np.abs(np.linspace(-1.0, 1.0, 64))
     inside = np.clip((1.0 - away) / _SHADOW_FADES, 0.0, 1.0)
     faded = inside**2 * (3.0 - 2.0 * inside)

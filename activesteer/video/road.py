@@ -101,7 +101,7 @@ def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray
 
 
 def add_areas(spec: mujoco.MjSpec, road: Road) -> None:
-    """Add the patches of other friction, the later on top of the earlier."""
+    """Add the patches with a different friction, later ones on top of earlier ones."""
     for piece in road.pieces(-_FAR_M, _FAR_M, -_FAR_M, _FAR_M)[:_MAX_PIECES]:
         right, left = piece.corners_m[[0, 1]], piece.corners_m[[3, 2]]
         width, middle = np.linalg.norm(left.mean(axis=0) - right.mean(axis=0)), 0.5 * (left + right)

@@ -103,7 +103,7 @@ class Claim:
 
     @property
     def text(self) -> str:
-        """Words of the statement."""
+        """Text of the statement."""
         return self.statement.text
 
 
@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre, whose last row is one step before the end."""
+    """Return whether a run ended before its manoeuvre, allowing for the last row at one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -256,7 +256,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
 
 
 def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
-    """Compare the demanded rear and superposed angle, without the give of the hinges, since the start of steer."""
+    """Compare the demanded rear and superposed angle, without the hinges' compliance, since the start of steer."""
     if not whole:
         return {TOGETHER: {"added_angles_common_s": 0.0}}
     ars, afs = recordings["ars"], recordings["afs"]

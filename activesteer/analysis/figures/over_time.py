@@ -55,7 +55,7 @@ class DrawnRun(NamedTuple):
 
     @property
     def linestyle(self) -> LineStyle:
-        """Its dashes in the notation of matplotlib."""
+        """Dashes in the notation of matplotlib."""
         return (0.0, self.look.dashes) if self.look.dashes else "-"
 
     @property
@@ -194,7 +194,7 @@ def fill_panels(axes: Sequence[Axes], drawn: Sequence[DrawnRun], panels: Sequenc
 
 
 def keep_span(axis: Axes, shown: Quantity) -> None:
-    """Keep a nearly constant signal flat, so that its rounding is not seen."""
+    """Keep a nearly constant signal flat, so that rounding noise is not visible."""
     low, high = axis.get_ylim()
     if high - low < shown.min_span:
         middle = 0.5 * (low + high)
@@ -232,7 +232,7 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
 
 
 def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> None:
-    """Keep the scale of the cars that do not spin, and draw all cars over the whole time in an inset."""
+    """Keep the axis scale of the cars that do not spin, and draw all cars over the whole time in an inset."""
     # The inset stands in the corner that the curves leave free.
     kept = [curve for curve in drawn if not curve.lost]
     if len(kept) in (0, len(drawn)) or panel is PANELS["added"]:
@@ -277,7 +277,7 @@ def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> Non
 
 
 def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Draw the times of `sine_with_dwell.marks`, with their words above the first axis."""
+    """Draw the times of `sine_with_dwell.marks`, with their labels above the first axis."""
     # Runs that reach a mark at different times have their own lines. The figure is as wide as a column.
     listed = [marks(curve.recording) for curve in drawn]
     left, right = axes[0].get_xlim()

@@ -93,7 +93,7 @@ def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
 
 
 def _shade_body(axis: Axes, curve: DrawnRun) -> None:
-    """Shade the road that the front of the body covers: a car on a stretched map is a sliver."""
+    """Shade the road that the front of the body covers, because a car on a stretched map would be a sliver."""
     try:
         left, right, *_ = lanes.corners(curve.recording, read_footprint(curve.recording))
     except RecordingError:

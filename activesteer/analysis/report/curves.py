@@ -36,7 +36,7 @@ DIGITS: Final = 4
 
 
 def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bool, Array]]:
-    """Yield the lines of a run, each with whether it is dotted: all but the first of the panel."""
+    """Yield the lines of a run, each with a flag that is set for dotted lines: all but the first of the panel."""
     if panel.extreme is not None:
         yield False, panel.extreme.reduce([recording[line.channel] for line in panel.lines])
         return
@@ -104,7 +104,7 @@ def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values of a curve, of a long run its extremes, so that no peak is lost."""
+    """Return the values of a curve, reduced to its extremes for a long run so that no peak is lost."""
     # Each pair of instants takes the least and the greatest value up to the next pair.
     if len(grid) < 2 or grid[1] - grid[0] <= MAX_STEP_S:
         return _sampled(time_s, values, grid)

@@ -129,7 +129,7 @@ def _swatch(look: RunLook) -> Markup:
 
 
 def _outcome(found: Mapping[str, Any]) -> Markup:
-    """Return what a run lost and what it kept."""
+    """Return the losses of a run and the requirements that it kept."""
     looks = ((failed, found["losses"]), (passed, found["kept"]))
     return Markup(" ").join(look(", ".join(words), chip=True) for look, words in looks if words)
 
@@ -247,7 +247,7 @@ def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
 
 
 def _events(group: Group) -> list[str]:
-    """Return what happened on the way, a line for each run."""
+    """Return the events during the runs, one line for each run."""
     listed = {run.name: events_of(run.recording.metadata) for run in group.runs}
     return [
         f"{name}, on the way: {', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
@@ -336,7 +336,7 @@ def _is_judged(run: ReportedRun) -> bool:
 
 
 def key_figures(group: Group) -> dict[str, str]:
-    """Return the titles of the columns of key figures, with their units, and the metrics that any run has of them."""
+    """Return the column titles of the key figures, with units, and the metrics among them that any run has."""
     names = {name for run in group.runs for name in run.recording.metrics}
     found = {}
     for title, metrics in KEY_FIGURES.items():
@@ -384,7 +384,7 @@ def _changed(group: Group) -> list[str]:
 
 
 def changed_parameters(run: ReportedRun) -> str:
-    """Describe the overrides of a run, with their values and keys, or empty without overrides."""
+    """Return a description of the overrides of a run, with their values and keys, empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
     labels = {key: parameter_label(key) for key in changed} if isinstance(changed, Mapping) else {}
     return ", ".join(f"{words} {changed[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())

@@ -314,7 +314,7 @@ def _renamed_engine(path: Path, token: str) -> tuple[str, bytes]:
 
 
 def _compiled(files: Mapping[str, bytes], engine: tuple[str, bytes], token: str) -> bytes:
-    """Return the library."""
+    """Return the compiled library."""
     compiler = os.environ.get("CC", "cc")
     if shutil.which(compiler) is None:
         raise ModelError(

@@ -239,7 +239,7 @@ class LocalInstance:
         return f": {self._log[:_MAX_LOG]}" if self._log else ""
 
     def _said(self, *message: Any) -> None:
-        """Keep the text of a log message, which is the last argument of both versions."""
+        """Store the text of a log message, which is the last argument in both versions."""
         self._log = (message[-1] or b"").decode(errors="replace")
 
 

@@ -50,7 +50,7 @@ class Link(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals of some messages."""
+    """Signals that messages contain."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
     others: frozenset[str]  # names of fields that are no numbers
@@ -63,7 +63,7 @@ class Signals(NamedTuple):
 
 
 def signals_of(messages: Sequence[type[Any]]) -> Signals:
-    """Return the signals of messages.
+    """Return the signals that messages contain.
 
     A field of the four wheels is one signal of four numbers, and four signals of one number. If several messages have
     a field, its name means the first of them; `message.field` means any of them.
@@ -299,7 +299,7 @@ class FmuBlock:
 
 
 class _Shared:
-    """An instance, and the states of the blocks that take turns with it."""
+    """An instance, and the states of the blocks that share it."""
 
     def __init__(self, instance: LocalInstance | IsolatedInstance) -> None:
         self.instance, self.lock = instance, threading.Lock()
@@ -405,11 +405,11 @@ class Fmu:
         return self.kind.fail(self.path.name, problem, *about)
 
     def from_vehicle(self, setup: Any, **parameters: Any) -> FmuBlock:
-        """Make the block of one run."""
+        """Create the block of one run."""
         return FmuBlock(self, setup, parameters)
 
     def spec_for(self, setup: Any, parameters: Mapping[str, Any]) -> tuple[Spec, int]:
-        """Return the instance for a run, and the steps of its caller between two steps, with held outputs between."""
+        """Return the instance for a run, and the number of the caller's steps for which its outputs are held."""
         about, every, step_s = self.description, 1, setup.timestep_s
         if self.kind.word == "driver" and self.interval_s is not None:
             every = max(1, round(self.interval_s / step_s))

@@ -136,7 +136,7 @@ class HeldCar:
                 model.tendon_lengthspring[tendon] = data.ten_length[tendon]
 
     def reset(self) -> None:
-        """Return to the first equilibrium, to the last digit."""
+        """Restore the first equilibrium bit-identically."""
         qpos, load, inverse, self._held = self._start
         self.data.qpos[:] = qpos
         self.load_N, self._inverse = load.copy(), inverse.copy()

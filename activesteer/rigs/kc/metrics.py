@@ -39,7 +39,7 @@ class Axle(NamedTuple):
 
     @property
     def wheels(self) -> slice:
-        """Columns of the per-corner arrays."""
+        """Columns of the axle's wheels in the per-corner arrays."""
         return {"front": slice(0, 2), "rear": slice(2, 4), "car": slice(0, 4)}[self.name]
 
     @property

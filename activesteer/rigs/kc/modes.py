@@ -1,4 +1,4 @@
-"""Natural frequencies and damping of the standing car on its tyres, which are springs here.
+"""Natural frequencies and damping of the standing car on its tyres, modelled as springs.
 
 The car is free. Each tyre is a spring at the contact point: vertically with its stiffness under static load, and
 sideways with the stiffness of its carcass, since it does not slide (a four-post rig). Along the car the wheels roll.
@@ -217,7 +217,7 @@ def _named(linear: _Linear) -> dict[str, Mode]:
 
 
 def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
-    """Return inertia and Jacobian rows of each motion that gives a mode its name."""
+    """Return inertia and Jacobian rows of each motion after which a mode is named."""
     model, data = linear.model, linear.data
     chassis = model.body("chassis").id
     along, about = linear.velocity_map(chassis, data.xipos[chassis])

@@ -30,7 +30,7 @@ from activesteer.vehicle.parameters import Friction
 
 @dataclass(frozen=True)
 class KcMetric:
-    """One metric of the car."""
+    """One K&C metric of the car, with its target band."""
 
     name: str
     axle: str  # `front`, `rear` or `car`

@@ -196,7 +196,7 @@ def _check_curves(study: StudyFile, scenario: Scenario) -> None:
 
 
 def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:
-    """Return key -> extreme values, or all values if they have no order, or None where a key is not set."""
+    """Return the extreme values of each key, all values if they have no order, or None where the key is not set."""
     if study.case_list is None:
         return {factor.key: list(factor.extremes) for factor in study.factors}
     found: dict[str, list[Any]] = {}

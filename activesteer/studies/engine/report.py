@@ -247,7 +247,7 @@ def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> l
 
 
 def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
-    """Return the means over the first two grids, by controller: over all values of further grids."""
+    """Return the means over the first two grids, by controller, averaged over all values of further grids."""
     grids = [factor for factor in study.factors if factor.kind == "grid"][:2]
     if len(grids) < 2:
         return None
@@ -331,7 +331,7 @@ def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
 
 
 def _front(found: Tuning) -> Panel:
-    """Return two objectives against each other, one over the sets, or the statements over the implausibility."""
+    """Return two objectives versus each other, one versus the sets, or the statements versus the implausibility."""
     names = list(found.trials[0].objectives)
     x, y = names[:2] if len(names) > 1 else ("set", *names, "statements that hold")[:2]
     if found.goal is Goal.SATISFY:
@@ -355,7 +355,7 @@ def _front(found: Tuning) -> Panel:
 
 
 def _violations(found: Tuning) -> Picture:
-    """Return how the margin fell, and where violations are."""
+    """Return the fall of the margin, and the places of violations."""
     ((name, _),) = found.trials[0].margins.items()
     margins = np.array([trial.margins[name] for trial in found.trials])
     judged = np.abs(margins) < 0.99e6  # others define no metric

@@ -176,7 +176,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
 
 
 def differences(settings: Settings) -> str:
-    """Return the differences from the start of the study in words, or empty if there are none."""
+    """Return a description of the differences from the start of the study, empty if there are none."""
     try:
         here = present_inputs(settings)
     except ActiveSteerError as error:
@@ -196,7 +196,7 @@ def prepare(workers: Workers, settings: Settings) -> None:
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compile the native code, and return in words why this machine cannot drive the runs, or an empty text."""
+    """Compile the native code, and return the reason why this machine cannot drive the runs, or an empty text."""
     if problem := differences(settings):
         return problem
     install_native_forces()
@@ -217,7 +217,7 @@ def run_command(
     overrides: Mapping[str, Any],
     driver: Any = DEFAULT_DRIVER,
 ) -> str:
-    """Return the `activesteer run` that repeats a run bit for bit.
+    """Return the `activesteer run` command that repeats a run bit-identically.
 
     A manoeuvre or vehicle given as a table appears as its name. The override `driver` replaces the driver.
     """
@@ -263,7 +263,7 @@ Row = dict[str, Any]
 
 
 def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.inf) -> list[Row]:
-    """Make some runs."""
+    """Drive some runs."""
     end_s = time.monotonic() + most_s
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
@@ -293,7 +293,7 @@ def _problem(key: str, settings: Settings) -> str:
 
 
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
-    """Make the runs of one sample: the same car on the same road with one controller after the other."""
+    """Drive the runs of one sample: the same car on the same road with one controller after the other."""
     first = requests[0]
     place = first.maneuver, first.vehicle, first.overrides
     try:
@@ -322,7 +322,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
-    """Make one run, fill its row, and return the recording of a complete run."""
+    """Drive one run, fill its row, and return the recording of a complete run."""
     path = _recording_path(settings, request)
     every = settings.study.recordings
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)

@@ -116,7 +116,7 @@ def _is_in(factor: Factor, value: Any) -> bool:
 
 
 class Judgement(NamedTuple):
-    """Judgement of a set: what shall be small, and the margins of its statements and of its constraints, by name."""
+    """Judgement of a set: the quantities to minimise, and the margins of its statements and constraints, by name."""
 
     objectives: list[float]
     margins: dict[str, float]

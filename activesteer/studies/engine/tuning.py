@@ -155,7 +155,7 @@ def tune(
 
 
 def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
-    """Return the search of a study in a folder as far as it is, also of another version of the package."""
+    """Return the search of a study in a folder as far as it has come, also one of another version of the package."""
     (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
     return search.result(search.stored())
 

@@ -55,7 +55,7 @@ class Workers:
         """Replace dead workers."""
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Call a function once on every machine before its workers start, and return the first objection."""
+        """Call a function once on every machine before its workers start, and return the first problem."""
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:

@@ -309,7 +309,7 @@ def driver_loops(
 
 
 def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
-    """Return in words the smallest phase margin and the smallest damping, against what is asked."""
+    """Return a text on the smallest phase margin and the smallest damping, compared with the requirements."""
     found: list[Text] = []
     slowest, fastest = DAMPED_KMH
     damped = f" from {slowest:g} to {fastest:g} km/h"

@@ -63,7 +63,7 @@ class Identification:
         return shown
 
     def lines(self) -> dict[str, dict[str, str]]:
-        """Return the tables of the vehicle file: name -> key -> value as text."""
+        """Return the tables of the vehicle file, each with its values as text by key."""
         return {"single_track": single_track_lines(self.single_track), "two_track": two_track_lines(self.two_track)}
 
     def to_json(self) -> dict[str, Any]:

@@ -389,7 +389,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
 
 
 def _conclusion(modes: Sequence[Mode]) -> list[Text]:
-    """Return in words the stability and the least damped mode of the car, and of yaw and sideslip."""
+    """Return a text on the stability and the least damped mode of the car, and of yaw and sideslip."""
     shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
     growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
     swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)
@@ -482,7 +482,7 @@ def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
 
 
 def _branches(found: Sequence[Sequence[tuple[str, complex]]]) -> list[tuple[str, list[complex]]]:
-    """Return paths of poles from one speed to the next, each with the commonest name that no longer path has."""
+    """Return paths of poles from one speed to the next, each with its commonest name not taken by a longer path."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to import
 
     paths: list[list[tuple[str, complex]]] = []

@@ -290,7 +290,7 @@ def _rolling(scenario: Scenario) -> Measurement:
 
 
 def _fully_active(setup: ControllerSetup) -> ControllerSetup:
-    """Return the parameters with correctors that act on all errors."""
+    """Return the setup with correctors without a dead band, so that they act on all errors."""
     gains = setup.gains
     acting = {
         name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))

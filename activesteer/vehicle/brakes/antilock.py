@@ -232,7 +232,7 @@ def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
 
 @compiled
 def _hold_sides_together(setup, state, steered_Pa):
-    """Limit the front wheel with more grip: it may exceed the other by what a driver can steer against."""
+    """Limit the front wheel with more grip: its pressure may exceed the other's by what a driver can steer against."""
     if state.phase[0] == OFF and state.phase[1] == OFF:
         state.side_Pa = setup.side_difference_Pa
         return
