@@ -38,6 +38,8 @@ from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End
 from activesteer.explore.worker import work
 
 HOST: Final = "127.0.0.1"
+TAKEN: Final = 4000
+"""Code with which the connection of a page ends when another window takes its place."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 _OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js")
 """Files that the page shares with the report."""
@@ -156,10 +158,11 @@ class ExploreServer:
             await page.close(1008)
             return
         await page.accept()
-        if self._page is not None:
-            await self._tell(self._page, "this page was opened in another window")
+        older, self._page = self._page, page
+        if older is not None:
+            with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
+                await older.close(TAKEN)
             self._hand_on(End())  # a drive of that page
-        self._page = page
         if self._ready is not None:
             header, arrays = self._ready
             await self._deliver({**header, **Folder(Path(self._folder)).names()}, arrays)  # the folder as it is now

@@ -22,7 +22,7 @@ const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0 };
 window.activesteer = state; // for tests and the curious
 
-const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), say);
+const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); $("start").disabled = true; });
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
@@ -75,9 +75,9 @@ function addBox(name) {
   $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, name, swatches.get(name)));
 }
 
-function without() {
+function without(text = "Choose at least one controller.", hint = true) {
   asking.stop();
-  say("Choose at least one controller.", true);
+  say(text, hint);
   $("state").textContent = "";
   usable(false, true);
 }
