@@ -83,10 +83,13 @@ export class Curves {
     ctx.textAlign = "left";
     ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
     const first = u === this.plots.values().next().value?.plot;
+    let free = -Infinity; // where the words of the mark before end
     for (const { time_s, text } of marks) {
       const x = u.valToPos(time_s, "x", true);
       ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-      if (first) ctx.fillText(text, x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      if (!first || x < free) continue;
+      ctx.fillText(text, x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
+      free = x + 3 * devicePixelRatio + ctx.measureText(text).width;
     }
     ctx.restore();
   }
