@@ -24,6 +24,7 @@ PATH_DISTANCE: Final = "path_distance_m"
 AXLE_SLIP: Final = {f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l", f"{axle[0]}r") for axle in ("front", "rear")}
 """Slip angle of an axle -> its wheels. It is their mean by wheel load, so that a lifted wheel has no part."""
 _LEAST_LOAD_N: Final = 1.0
+"""Load of a lifted wheel in this mean [N]: an axle in the air has the mean of both."""
 
 
 class Channels(Protocol):

@@ -256,10 +256,10 @@ class Runs:
         looks = run_looks(choice.controllers)
         self._choice = choice, overrides
         road = scenario.maneuver.road
-        mu = 0.0 if is_overruled(road, "mu") else road.mu
+        mu = None if is_overruled(road, "mu") else road.mu
         for name in choice.controllers:
             look = looks[name]
-            run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu or None}
+            run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
             run["title"] = (scenario.maneuver.title or choice.maneuver) + held
             try:
                 controller = controller_spec(self.folder.located(name))

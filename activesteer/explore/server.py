@@ -38,8 +38,8 @@ from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End
 from activesteer.explore.worker import work
 
 HOST: Final = "127.0.0.1"
-TAKEN: Final = 4000
-"""Code with which the connection of a page ends when another window takes its place."""
+TAKEN: Final = 4000, "This page was opened in another window. Reload it to go on here."
+"""Code and reason with which the connection of a page ends when another window takes its place."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 _OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js")
 """Files that the page shares with the report."""
@@ -161,7 +161,7 @@ class ExploreServer:
         older, self._page = self._page, page
         if older is not None:
             with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
-                await older.close(TAKEN)
+                await older.close(*TAKEN)
             self._hand_on(End())  # a drive of that page
         if self._ready is not None:
             header, arrays = self._ready

@@ -182,13 +182,14 @@ def resolve(
 
 
 _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
+    ("steer", "steering_wheel_rad"): (r"[\d.]+ [Ag]\b", "{:.3g} deg", math.pi / 180.0),
     ("steer", "amplitude_factor"): (r"[\d.]+ A\b", "{:.3g} A", 1.0),
     ("steer", "lateral_acceleration_mps2"): (r"[\d.]+ g\b", "{:.3g} g", GRAVITY_MPS2),
     ("turn", "lateral_acceleration_mps2"): (r"[\d.]+ m/s²", "{:.3g} m/s²", 1.0),
     ("cones", "spacing_m"): (r"[\d.]+ m\b", "{:.3g} m", 1.0),
     ("road", "mu"): (r"\b(dry|slippery)\b", "friction {:.3g}", 1.0),
 }
-"""Field of a manoeuvre -> how titles of files say its value, what they say of another one, and the SI value of one."""
+"""Field of a manoeuvre -> pattern of its value in a title, text of a driven value, and the unit of this text in SI."""
 
 
 def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:

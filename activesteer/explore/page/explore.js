@@ -347,9 +347,8 @@ addEventListener("hashchange", readAddress);
 // On a phone, the choice makes room for its results.
 for (const id of NAMED) $(id).addEventListener("change", () => {
   if (small.matches) $("choice").open = false;
-  const kept = id === "maneuver" ? {} : state.values; // another car or driver leaves the sliders where they are
+  if (id !== "maneuver") state.wanted = state.values; // another car or driver leaves the sliders where they are
   describe();
-  state.wanted = kept;
 });
 $("group").addEventListener("change", showGroup);
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });

@@ -16,8 +16,7 @@ export class Socket {
       });
       heard(header, arrays);
     };
-    this.socket.onclose = ({ code }) => lost(code === 4000 ? "This page was opened in another window. Reload it to go on here."
-      : "The connection to the program has ended. Start `activesteer explore` again and open its new address.");
+    this.socket.onclose = ({ reason }) => lost(reason || "The connection to the program has ended. Start `activesteer explore` again and open its new address.");
   }
 
   send(message) {

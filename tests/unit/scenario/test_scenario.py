@@ -90,6 +90,8 @@ def test_overrides_reach_manoeuvre_and_vehicle_in_any_unit():
     ("maneuver", "key", "value", "title"),
     [
         ("sine_with_dwell", "steer.amplitude_factor", 2, "Sine with dwell, 80 km/h, 2 A, dry"),
+        ("sine_with_dwell", "steer.steering_wheel_deg", 120, "Sine with dwell, 80 km/h, 120 deg, dry"),
+        ("step_steer", "steer.steering_wheel_deg", 40, "Step steer, 80 km/h, 40 deg, dry"),
         ("step_steer", "steer.lateral_acceleration_mps2", 5.886, "Step steer, 80 km/h, 0.6 g, dry"),
         ("brake_in_turn", "turn.lateral_acceleration_g", 0.4, "Braking in a turn, 80 km/h, 3.92 m/s², dry"),
         ("slalom", "cones.spacing_m", 36, "Slalom 36 m, 100 km/h, dry"),

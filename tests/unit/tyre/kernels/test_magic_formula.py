@@ -203,6 +203,18 @@ def test_the_factors_of_the_moments_scale_what_they_are_named_after(old: bool) -
     assert moments(LMY=1.5)[1] == pytest.approx(1.5 * my_Nm)
 
 
+@pytest.mark.parametrize(("mu", "low_deg", "high_deg"), [(0.9, 7.0, 11.0), (0.3, 2.0, 4.0)])
+@pytest.mark.parametrize("name", ["compact_205_55R16", "sedan_pac02"])
+def test_the_largest_side_force_is_at_the_slip_angle_that_explore_names(
+    name: str, mu: float, low_deg: float, high_deg: float
+) -> None:
+    formula, angles_deg = MagicFormula(tyre(name)), np.linspace(0.5, 25.0, 246)
+    for load_N in (2500.0, 4000.0, 6000.0):
+        force = np.abs(formula.evaluate(load_N, 0.0, np.radians(angles_deg), road_friction=mu).fy_N)
+        assert low_deg < angles_deg[force.argmax()] < high_deg
+        assert force[-1] < 0.99 * force.max()
+
+
 def test_a_road_without_friction_gives_finite_forces(compact: MagicFormula) -> None:
     forces = compact.evaluate(4000.0, [0.0, 0.5], [0.0, 0.5], road_friction=0.0)
     assert np.abs(forces.fx_N).max() < 1e-3
