@@ -50,7 +50,7 @@ from tools.tables import NOT_REPRODUCED, REPRODUCED
 
 DOCS: Final = Path(__file__).resolve().parent.parent / "docs"
 PAGE: Final = DOCS / "population.md"
-CHASSIS_CONTROL: Final = DOCS / "chassis_control.md"
+COMPARISON_PAGE: Final = DOCS / "controller_results.md"
 BEGIN: Final = "<!-- the table is written by tools/renew.py comparison -->\n"
 END: Final = "<!-- end of the table -->\n"
 COMPARED: Final = ("none", "esc", "lqr", "integrated")
@@ -120,7 +120,7 @@ def page(found: Population) -> str:
 
 
 def comparison_page(text: str, found: Population | None) -> str:
-    """Return the page on chassis control with the table of a comparison in its place.
+    """Return the page of the controllers' results with the table of a comparison in its place.
 
     Args:
         text: The page.

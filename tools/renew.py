@@ -49,19 +49,19 @@ def _around(options: Options) -> int:
 
 
 def _comparison(options: Options) -> int:
-    """Drive the population behind the comparison of controllers, and write its table into docs/chassis_control.md.
+    """Drive the population behind the comparison of controllers, and write its table into docs/controller_results.md.
 
     Call `renew.py pictures comparison_population` afterwards.
     """
     from tools.comparison import comparison_text
-    from tools.population_store import CHASSIS_CONTROL, COMPARED, comparison_page, driven, store_summary
+    from tools.population_store import COMPARED, COMPARISON_PAGE, comparison_page, driven, store_summary
 
     controllers = options.controllers.split(",") if options.controllers else COMPARED
     found, _ = driven(options, controllers, "comparison")
     print(comparison_text(found))
     print(store_summary(found, "comparison"))
-    text = CHASSIS_CONTROL.read_text(encoding="utf-8")
-    CHASSIS_CONTROL.write_text(comparison_page(text, found), encoding="utf-8")
+    text = COMPARISON_PAGE.read_text(encoding="utf-8")
+    COMPARISON_PAGE.write_text(comparison_page(text, found), encoding="utf-8")
     return 0
 
 

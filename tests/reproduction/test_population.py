@@ -18,7 +18,7 @@ from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import CLAIM, Row, drive
 from tools.population_results import CHANGES, Population, population_study, read_population, summarise
-from tools.population_store import CHASSIS_CONTROL, PAGE, comparison_page, page, stored_runs
+from tools.population_store import COMPARISON_PAGE, PAGE, comparison_page, page, stored_runs
 
 TOLERANCE = 1e-3
 CHECKED = 8
@@ -73,8 +73,8 @@ def test_the_page_says_what_is_stored():
     assert PAGE.read_text(encoding="utf-8") == page(stored())
 
 
-def test_the_page_on_chassis_control_says_what_is_stored():
-    text = CHASSIS_CONTROL.read_text(encoding="utf-8")
+def test_the_results_of_the_controllers_are_the_stored_ones():
+    text = COMPARISON_PAGE.read_text(encoding="utf-8")
     assert text == comparison_page(text, read_population("comparison"))
 
 
