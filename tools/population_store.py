@@ -61,17 +61,18 @@ PRODUCTION: Final = "sensors.preset = production"
 """Key of the samples with the sensors of production cars."""
 _HEAD: Final = """# The population
 
-This page shows how often each claim holds if car, road, driver, line, gains and sensors vary.
+This page shows how often each [claim](claims.md) holds if car, road, driver, line, gains and sensors vary.
 
-`activesteer study population` drives {samples} variations of the {vehicle}, its road, its
-driver, his line and the gains through the paper's five scenarios with all three systems: {runs} runs. The package
-stores the results (`studies/population/`). `tools/renew.py population` renews the results and this page. They were
-driven with {versions}.
+`activesteer study population` drives {samples} variations of the {vehicle} through the paper's five scenarios. Each
+variation drives with all three systems: {runs} runs in total. The package stores the results (`studies/population/`).
+`tools/renew.py population` renews the results and this page.
+
+They were driven with {versions}.
 
 ## Varied quantities
 
-The samples are a Sobol' sequence over the ranges below, the same for the three systems. Controllers and driver are not
-told.
+The samples are a Sobol' sequence over the ranges below. The three systems drive the same samples. Controllers and
+driver do not know the varied values.
 
 ```toml
 {factors}
@@ -79,11 +80,19 @@ told.
 
 ## Proportion in which each claim holds
 
-A claim *holds* if its 95 % interval (Wilson) lies above 80 %, *does not hold* if it lies below 20 %, and otherwise
-*depends*. Half of the samples have ideal sensors and half those of a production car; the column behind the verdict has
-the proportion for the latter. The last column names the factor that explains most of the verdict, by a regression on
-every factor and its square, and the fraction of the variance that it explains. It is empty if no factor explains more
-than chance. Claims without a driver are about the open-loop manoeuvres, where the steering wheel follows a table.
+The 95 % interval (Wilson) of the proportion decides the verdict:
+
+- A claim *holds* if the interval lies above 80 %.
+- A claim *does not hold* if the interval lies below 20 %.
+- All other claims *depend* on the variation.
+
+Half of the samples have ideal sensors, and half have the sensors of a production car. The column after the verdict
+gives the proportion with production sensors.
+
+The last column names the factor that explains most of the verdict, and the fraction of the variance that it explains.
+The fraction comes from a regression on each factor and its square. The cell is empty if no factor is significant.
+
+Claims without a driver are about open-loop manoeuvres, in which the steering wheel follows a table.
 
 | | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | more often |
 |---|---|---|---|---|---|---|---|---|
@@ -91,9 +100,10 @@ than chance. Claims without a driver are about the open-loop manoeuvres, where t
 _SYSTEMS: Final = """
 ## Effect of each system
 
-A car is *lost* if its sideslip angle exceeds 20 deg (it spins), if its body leaves the lanes, or if it misses a cone of
-the slalom. A car that is lost without control and not with a system is *saved*; the reverse is *spoiled*. Changes are
-relative to the same sample without control: median, and the range of 90 % of the samples.
+A car is *lost* in any of these cases: its sideslip angle exceeds 20 deg (it spins), its body leaves the lanes, or it
+misses a cone of the slalom. A car is *saved* if it is lost without control but not with a system. It is *spoiled* if it
+is lost only with the system. Changes are relative to the same sample without control. They are given as the median and,
+in brackets, the range of 90 % of the samples.
 
 | scenario | | lost without | saved | not lost without | spoiled | spin without, with | changes |
 |---|---|---|---|---|---|---|---|

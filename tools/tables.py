@@ -29,8 +29,6 @@ from tools.population_results import Population, read_population
 from tools.proportions import percent
 
 CLAIMS_PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
-CLAIMS_BEGIN: Final = "<!-- the table is written by tools/renew.py claims -->\n"
-CLAIMS_END: Final = "<!-- end of the table -->\n"
 VEHICLE: Final = "compact"
 SENSORS: Final = "sensors.preset"
 PRESETS: Final = ("ideal", "production")
@@ -40,15 +38,15 @@ REPRODUCED: Final = "\N{CHECK MARK} reproduced"
 NOT_REPRODUCED: Final = "\N{NOT EQUAL TO} not reproduced"
 
 
-def claims_table() -> str:
-    """Return the claims_table in Markdown: first statements only about the systems, then statements with a driver."""
+def claims_table() -> list[str]:
+    """Return the verdicts as lines of Markdown: first claims only about the systems, then claims with a driver."""
     known, population = not_reproduced(VEHICLE), read_population("population")
     fails = read_setting(PAPER).fails
-    lines = [*summary(), ""]
+    lines = []
     for kind in Kind:
         lines += [f"**{kind.value.capitalize()}**", ""]
         lines += [
-            "| | statement | paper's setting | driver from literature | population, % | ideal, production sensors, % | "
+            "| | claim | paper's setting | driver from literature | population, % | ideal, production sensors, % | "
             "depends most on |",
             "|---|---|---|---|---|---|---|",
         ]
@@ -59,18 +57,18 @@ def claims_table() -> str:
                 cells = (statement.id, statement.text, paper, nominal, *_proportion(population, statement.id))
                 lines.append("| " + " | ".join(cells) + " |")
         lines.append("")
-    return "\n".join([*lines, *around_setting()])
+    return lines[:-1]
 
 
 def around_setting() -> list[str]:
-    """Return the shares of the statements in the populations around the paper's setting, as lines of Markdown."""
+    """Return the shares of the claims in the populations around the paper's setting, as lines of Markdown."""
     fails, found = read_setting(PAPER).fails, [read_population(name) for name in AROUND]
     if any(one is None for one in found):
         return []
     samples = found[0].samples if found[0] else 0
     lines = [
-        f"**Around the paper's setting**: % of {samples} samples with the 95 % interval; behind the semicolon % with "
-        "ideal and with production sensors",
+        f"Each cell gives the per cent of {samples} samples with the 95 % interval. The two values after the semicolon "
+        "are for ideal and for production sensors.",
         "",
         "| | paper's setting | car, road and speed vary | driver, cones, gains, band and reference vary too |",
         "|---|---|---|---|",
@@ -83,14 +81,14 @@ def around_setting() -> list[str]:
         lines.append("| " + " | ".join((claim, FAILS if claim in fails else HOLDS, *shares)) + " |")
     means = [sum(claim.share for claim in one.claims) / len(one.claims) for one in found if one]
     counts = f"{len(STATEMENTS) - len(fails)} of {len(STATEMENTS)}"
-    return [*lines, f"| mean | {counts} | {' | '.join(map(percent, means))} |", ""]
+    return [*lines, f"| mean | {counts} | {' | '.join(map(percent, means))} |"]
 
 
 def summary() -> list[str]:
-    """Return the statements that hold, by scenario, as lines of Markdown."""
+    """Return the number of claims that hold in each scenario, as lines of Markdown."""
     known, population, fails = not_reproduced(VEHICLE), read_population("population"), read_setting(PAPER).fails
     lines = [
-        "| scenario | the paper's statements | paper's setting | driver from literature | population, ideal sensors | "
+        "| scenario | the paper's claims | paper's setting | driver from literature | population, ideal sensors | "
         "population, production sensors |",
         "|---|---|---|---|---|---|",
     ]
@@ -119,11 +117,20 @@ def _proportion(population: Population | None, number: str) -> tuple[str, str, s
     return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, found.words
 
 
+CLAIMS_PARTS: Final = {"counts": summary, "table": claims_table, "shares": around_setting}
+"""Part of the page of the claims that stands between its marks -> function that writes its lines."""
+
+
 def claims_page(text: str) -> str:
-    """Return the claims_page with the claims_table in its place."""
-    before, _, rest = text.partition(CLAIMS_BEGIN)
-    _, _, after = rest.partition(CLAIMS_END)
-    return f"{before}{CLAIMS_BEGIN}\n{claims_table()}{CLAIMS_END}{after}"
+    """Return the page of the claims with its tables renewed."""
+    for name, write in CLAIMS_PARTS.items():
+        verb = "is" if name == "table" else "are"
+        begin = f"<!-- the {name} {verb} written by tools/renew.py claims -->\n"
+        end = f"<!-- end of the {name} -->\n"
+        before, _, rest = text.partition(begin)
+        _, _, after = rest.partition(end)
+        text = f"{before}{begin}\n" + "\n".join(write()) + f"\n\n{end}{after}"
+    return text
 
 
 ESTIMATION_PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "estimation.md"
