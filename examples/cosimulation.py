@@ -5,7 +5,7 @@
 
 Both FMUs exchange data every millisecond, as in the paper, and then every 5 and 10 ms. The same car with the same
 controller in a single process is the reference. With FOLDER, the FMUs and their SSP file stay there.
-Needs a C compiler and `pip install activesteer[fmi]`.
+Needs a C compiler and `pip install '.[fmi]'` in a checkout.
 Guide: docs/coupling.md.
 """
 

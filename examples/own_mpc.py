@@ -1,6 +1,6 @@
 """Steer both axles by model predictive control within an envelope, with your own controller and solver.
 
-    pip install "activesteer[control]"
+    pip install '.[control]'     # in a checkout
     python examples/own_mpc.py
     activesteer run sine_with_dwell -c none -c "examples/own_mpc.py:EnvelopeMpc?sideslip_scale_deg=0.5"
 

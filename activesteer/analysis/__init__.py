@@ -4,8 +4,7 @@
   `handling` (ISO 4138), `sine_with_dwell` (FMVSS 126), `braking` (ISO 7975, ISO 21994,
   ISO 14512), `path_following` (lane change, slalom, any path), or those of all runs.
 - `claims`: the paper's statements about the three systems, as checks, with a scorecard.
-- `tables`, `figures`: the same to be read and looked at. The figures need matplotlib
-  (`pip install 'activesteer[plot]'`).
+- `tables`, `figures`: tables and figures of the metrics. The figures need matplotlib, the extra `plot`.
 
 In: recordings.
 Out: metrics, claims, harm, tables, figures and reports.

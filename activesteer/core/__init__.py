@@ -1,5 +1,5 @@
-"""Common parts of all rooms: conventions, units, messages, files and their limits, the table of metrics.
+"""Common parts of all packages: conventions, units, messages, files and their limits, the table of metrics.
 
-In: nothing of the other rooms.
+In: nothing of the other packages.
 Out: types, functions and tables without state.
 """
