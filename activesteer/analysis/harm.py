@@ -54,7 +54,7 @@ def is_lost(metrics: Metrics) -> bool:
 
 
 def is_controlled(metrics: Metrics) -> bool:
-    """Return whether no metric tells that the car was lost."""
+    """Return whether no metric shows that the car was lost."""
     # Some manoeuvres have no metric that could.
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
     return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
@@ -109,7 +109,7 @@ def kept(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def shown(name: str, metrics: Mapping[str, float], text: str) -> str:
-    """Return the text of a metric, or `lost` if it says nothing because the car has turned round."""
+    """Return the text of a metric, or `lost` if the car has turned round and the value is meaningless."""
     # The driver's steering, counts and verdicts remain.
     turned = any(abs(metrics.get(peak, 0.0)) > TURNED_ROUND_RAD for peak in SIDESLIP_PEAKS)
     remains = recorded_metric(name).whole or name.startswith("steering_wheel") or name not in metrics

@@ -71,7 +71,7 @@ def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Arr
 
 
 def struck_cones(recordings: Iterable[RecordingLike], course: Course) -> NDArray[np.bool_]:
-    """Return which cones of a course at least one of the cars hits, shape (number of cones,)."""
+    """Return the mask of the cones that at least one of the cars hits, shape (number of cones,)."""
     # A run without the place or the size of its car hits none.
     struck = np.zeros(len(course.cones_m), dtype=bool)
     for recording in recordings:

@@ -45,7 +45,7 @@ _LONGEST: Final = 1000
 
 
 def distance(margin: float) -> float:
-    """Return the distance from holding: 0 if it holds, 0.5 a scale away from the limit, 1 far away or undefined."""
+    """Return the distance from passing: 0 if it passes, 0.5 one scale from the limit, 1 far away or undefined."""
     if margin >= 0.0:
         return 0.0
     return max(1e-6, margin / (margin - 1.0)) if math.isfinite(margin) else 1.0
@@ -169,7 +169,7 @@ class Expression:
 
 
 class Requirement(Expression):
-    """One comparison or several, whose value is a margin that is negative if it is violated."""
+    """A comparison, or several joined by `and` and `or`. Its value is a margin, negative if it is violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 

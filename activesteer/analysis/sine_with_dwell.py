@@ -194,7 +194,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
-    """Return time and value of the first prominent maximum after a time, or of the largest value if there is none."""
+    """Return time and value of the first prominent maximum after a time, or of the largest value without one."""
     from scipy.signal import find_peaks  # noqa: PLC0415 - takes half a second to import
 
     after = np.flatnonzero(time_s >= begin_s)

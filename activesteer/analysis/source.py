@@ -32,10 +32,10 @@ class RecordingLike(Protocol):
 
 
 class Evaluable:
-    """A recorded run whose channels are fit for formulas: finite, with two rows or more."""
+    """A recorded run whose channels can be evaluated: finite, with two rows or more."""
 
     def __init__(self, recording: RecordingLike) -> None:
-        """Refuse a run that is too short."""
+        """Reject a run that is too short."""
         if len(recording.time_s) < 2:
             raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated, at least 2 are needed")
         self._recording = recording

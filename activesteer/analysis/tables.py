@@ -1,4 +1,4 @@
-"""Metrics as text, in degrees and km/h: values, differences that count, and a table of runs for a terminal."""
+"""Metrics as text in degrees and km/h: values, significant differences, and a table of runs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
 
 
 def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
-    """Return explanations of values that a reader may take for an error."""
+    """Return explanations of values that a reader may mistake for errors."""
     above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in FRICTION_UTILISATION)
     return wrapped_line(TYRE_USE_NOTE) if above else []
 
@@ -72,13 +72,13 @@ def significance(name: str, value: float, first: float) -> Change:
 
 
 def is_near(name: str, value: float, first: float) -> bool:
-    """Return whether neither a driver nor a sensor could tell two values [SI] apart."""
+    """Return whether two values [SI] differ by less than a driver or a sensor can notice."""
     least = recorded_metric(name).significance or _NEAR_SHARE * abs(first)
     return abs(value - first) <= least or difference_text(name, value, first).text == "0"
 
 
 class Cell(NamedTuple):
-    """A number, or a difference with its percentage of the first run's value, if that has a meaning."""
+    """Text of a number, or of a difference with its percentage of the first run's value if that is meaningful."""
 
     text: str
     percent: str = ""

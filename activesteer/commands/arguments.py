@@ -41,14 +41,14 @@ Part = Callable[[Any], object]
 
 
 class Group:
-    """Commands that `--help` lists together, and decorator for their functions if called with a declaration."""
+    """Group of commands in `--help`. Call it with a declaration to decorate the function of a command."""
 
     def __init__(self, title: str) -> None:
         self.title = title
         self.commands: list[tuple[str, str, str, Sequence[Part], Action | Group]] = []
 
     def __call__(self, name: str, help: str, *parts: Part, description: str = "") -> Callable[[Action], Action]:
-        """Declare a command."""
+        """Return a decorator that declares a function as a command."""
 
         def declare(action: Action) -> Action:
             self.commands.append((name, help, description or f"{help[0].upper()}{help[1:]}.", parts, action))
@@ -177,7 +177,7 @@ RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are com
 
 
 def driver(default: str = "") -> Part:
-    """Return `--driver`, whose value is None without the option if its default is in words."""
+    """Return the option `--driver`, which is None if it is not given and its default is described in words."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
         return option("--driver", "DRIVER", f"{words} (default: {default})")
@@ -185,7 +185,7 @@ def driver(default: str = "") -> Part:
 
 
 def controllers(default: str = "none") -> Part:
-    """Return `-c`, whose value is a list, or None for the default, which is given in words."""
+    """Return the option `-c`, a list of controllers, or None if it is not given. `default` describes the default."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )
@@ -193,7 +193,7 @@ def controllers(default: str = "none") -> Part:
 
 
 def output(metavar: str, help: str, default: str | None = None) -> Part:
-    """Return `-o`, with help on what is written there, and on the case without the option if it has no default."""
+    """Return the option `-o` for a file or folder. Without a default, `help` says what happens without it."""
     return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
 
 
@@ -201,7 +201,7 @@ FIGURES: Final = output("DIR", "folder for figures (default: no figures)")
 
 
 def check_effect(options: argparse.Namespace, effect: str, *keys: str) -> None:
-    """Reject options that were given although they have no effect, with `effect` as the reason."""
+    """Reject options that have no effect, with `effect` as the reason."""
     for key in keys:
         if getattr(options, key) not in (None, False):
             raise ParameterError(f"has {effect}", key=f"--{key}")

@@ -86,7 +86,7 @@ def _info(options: argparse.Namespace) -> None:
 
 
 def _driver(recorded: Any) -> str:
-    """Name and parameters of the driver, in recordings of earlier versions the name only."""
+    """Name and parameters of the driver, or only the name in recordings of earlier versions."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)
@@ -228,7 +228,7 @@ def _announce(url: str) -> None:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """`1280x720`."""
+    """Parse the size of a film, such as `1280x720`."""
     found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
     if found is None:
         raise argparse.ArgumentTypeError(f"{text!r} is no size such as 1280x720")

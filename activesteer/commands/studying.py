@@ -247,7 +247,7 @@ def _fit(options: argparse.Namespace) -> bool:
 
 
 def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: bool = False) -> bool:
-    """Predict a measurement, with `fitted` also fit the factors of the folder, and print the verdict."""
+    """Predict a measurement and print the verdict. With `fitted`, also fit the factors of the folder."""
     from activesteer.measured.circle import SAMPLES, validate_circle
     from activesteer.measured.folder import validate_measured
     from activesteer.measured.folder_file import measured_folder, read_measured

@@ -104,7 +104,7 @@ def coloured(text: str) -> str:
 
 
 def print_notes(notes: Iterable[str]) -> None:
-    """Print to standard error what is unusual in a result, a note in each line."""
+    """Print notes on unusual results to standard error, one per line."""
     for note in notes:
         print(entry("! ", note), file=sys.stderr)
 
@@ -164,7 +164,7 @@ class Progress:
             self._width = max(self._width, len(line))
 
     def count(self, runs: StudyProgress) -> None:
-        """Show number, rate and remaining time of many runs: a log, as of a batch job, gets a line in ten seconds."""
+        """Show number, rate and remaining time of many runs. A log gets a line every ten seconds."""
         now_s = time.monotonic()
         rate = runs.here / max(now_s - self._begun_s, 1e-6)
         left_s = round((runs.total - runs.done) / rate) if rate > 0.0 else 0

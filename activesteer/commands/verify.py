@@ -40,7 +40,7 @@ def _setting(name: str) -> str:
     arguments.JSON,
 )  # fmt: skip
 def _reproduce(options: argparse.Namespace) -> int:
-    """Drive the 15 runs in every setting asked for, and tell the verdicts."""
+    """Drive the 15 runs in each requested setting, and print the verdicts."""
     from activesteer.studies.reproduction import draw_figures, write_page
 
     settings = list(dict.fromkeys(options.settings or ["literature"]))
@@ -98,7 +98,7 @@ def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[st
 
 
 def _scenarios(result: Reproduction) -> Iterator[str]:
-    """Yield how many claims are reproduced, by scenario and in all, with the texts of the others."""
+    """Yield the number of reproduced claims, by scenario and in all, with the texts of the other claims."""
     from activesteer.analysis.claims.judge import SCENARIO_OF
     from activesteer.analysis.claims.scorecard import Verdict
 

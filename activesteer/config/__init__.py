@@ -134,7 +134,7 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
 
 
 def _parsed(text: str) -> dict[str, Any]:
-    """Parse a TOML text."""
+    """Parse a TOML text, and limit the depth of its keys, lists and tables."""
     if _DEEP_KEY.search(text):
         raise ValueError(f"a key is nested more than {limits.MAX_TOML_DEPTH} deep")
     try:
@@ -155,7 +155,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML, which has the texts, numbers and lists of JSON."""
+    """Return a value as TOML text, with texts, numbers and lists written as in JSON."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -327,7 +327,7 @@ def _merged_list(
 
 
 def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: Iterable[Sequence[str]]) -> None:
-    """Refuse keys that other keys make ineffective (see `OVERRULED`)."""
+    """Reject keys that other keys make ineffective (see `OVERRULED`)."""
     for path in given:
         owner, within = cls, table
         for key in path[:-1]:
@@ -479,7 +479,7 @@ def check_points(
     key: str, points: Sequence[float], columns: Mapping[str, Sequence[float] | None], count: Range,
     error: type[ActiveSteerError] = ParameterError,
 ) -> None:  # fmt: skip
-    """Refuse points of a curve that do not increase, or of another number, and columns of another length."""
+    """Check that the points of a curve increase, are of an allowed number, and have columns of equal length."""
     if not count.low <= len(points) <= count.high:
         raise error(f"has {len(points)} points; allowed is {count}", key=key)
     for before, after in itertools.pairwise(points):

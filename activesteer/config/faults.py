@@ -16,7 +16,7 @@ from activesteer.errors import ManeuverError, ParameterError, nearest_names, sho
 
 
 class Actuator(NamedTuple):
-    """An actuator as faults name it."""
+    """A part with actuators that can fail."""
 
     members: tuple[str, ...]  # the engine's actuators that it stands for
     unit: str = "rad"  # unit of a size, as the suffix of a key
@@ -138,7 +138,7 @@ class Fault:
 
     @property
     def _needed(self) -> str | None:
-        """Key that gives the size."""
+        """Key that the kind of fault needs, or None."""
         if self.kind == "delayed":
             return "delay_s"
         if self.kind == "runaway" and self.part in ACTUATORS:

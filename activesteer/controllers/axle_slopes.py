@@ -74,7 +74,7 @@ class AxleSlopes(NativeBlock):
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
-    """Return the additional slip angles of an axle against a straight curve, at lateral accelerations from 0 on [rad].
+    """Return the slip angles of an axle in excess of a straight curve, at lateral accelerations from 0 on [rad].
 
     `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
     """

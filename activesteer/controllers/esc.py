@@ -37,7 +37,7 @@ class Esc:
         self._yaw_inertia_kgm2, self._levers = setup.single_track.yaw_inertia_kgm2, brake_levers(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return the brake torques."""
+        """Return the brake torques for the current yaw rate error and sideslip angle."""
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(estimate=now)

@@ -112,7 +112,7 @@ CONTROLLER: Final = _ControllerKind(
 
 
 def controller_spec(given: Any) -> Plugin:
-    """Find a controller.
+    """Find a controller by its name, its file or its code.
 
     Args:
         given: Name of a controller or variant, or path of a variant file; or a user's own code:
@@ -130,7 +130,7 @@ def controller_spec(given: Any) -> Plugin:
 
 
 def is_variant(given: Any) -> bool:
-    """Return whether a controller is given as data: by the name of a variant or by its file."""
+    """Return whether a controller is given as data: by the name of a variant, or by its file."""
     return CONTROLLER.is_data(given)
 
 

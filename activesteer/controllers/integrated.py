@@ -1,4 +1,4 @@
-"""One controller for rear steering, front superposition and brakes: steering first, brakes for what is missing.
+"""One controller for rear steering, front superposition and brakes: steering first, then the brakes.
 
 The angles are those of `lqr` with its allocation, within their limits and rates (`controllers/allocation.py`). The law
 of `esc` gives the yaw moment that the car needs to stay under control, beyond its bands:
@@ -238,7 +238,7 @@ class Integrated:
         )
 
     def _missing_moment(self, now: Estimate, driver_rad: float, ay_mps2: float, steered_Nm: float) -> float:
-        """Return the part of the stability demand that the steering cannot provide in the time ahead [Nm]."""
+        """Return the part of the stability demand that the steering cannot provide within the time ahead [Nm]."""
         borne = self._borne.borne(driver_rad, now.speed_mps, now.friction, ay_mps2)
         if now.speed_mps < self._stability.least_speed_mps:
             return 0.0

@@ -30,7 +30,7 @@ _LINEAR: Final = ("none", "ars", "afs")
 
 @dataclass(frozen=True)
 class LinearController:
-    """x[k+1] = A x[k] + B w[k], u[k] = C x[k] + D w[k], one step of the setup between k and k+1.
+    """Linear controller x[k+1] = A x[k] + B w[k], u[k] = C x[k] + D w[k], with one step of the setup per k.
 
     Inputs w: the driver's demand at the road wheel [rad], the yaw rate [rad/s]. Outputs u: rear steer angle and
     superposition demanded [rad].

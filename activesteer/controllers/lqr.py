@@ -193,7 +193,7 @@ class Lqr(NativeBlock):
         self._rear_compensation_radpNm = 1.0 / (wheelbase_m * self._car.rear_stiffness_Nprad)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return both angles."""
+        """Return the demanded angles of superposition and rear wheels."""
         now = self._estimator.step(measurement)
         return steering(
             regulated(

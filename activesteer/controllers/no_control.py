@@ -21,7 +21,7 @@ class NoControl(NativeBlock):
         self._desired = DesiredYawRate(SingleTrack(setup.single_track), setup.gains.desired_yaw_rate, setup.timestep_s)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return no angles, and the desired yaw rate for the recording."""
+        """Return no steering angles, and the desired yaw rate for the recording."""
         return steering(no_control(self, command, measurement))
 
 
@@ -44,5 +44,5 @@ class Observer:
         self._estimator = setup.estimator()
 
     def step(self, _command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return no angles, and the estimate for the recording."""
+        """Return no steering angles, and the estimate for the recording."""
         return ActuatorCommand(estimate=self._estimator.step(measurement))

@@ -130,7 +130,7 @@ class TorqueVectoringParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Brakes for what the steering of `lqr` cannot provide (`integrated`), in addition to [controllers.lqr].
+    """Brakes that add what the steering of `lqr` cannot provide (`integrated`); see also [controllers.lqr].
 
     A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """

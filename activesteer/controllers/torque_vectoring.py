@@ -201,7 +201,7 @@ class TorqueVectoring:
         self._yaw_inertia_kgm2, self._torques = setup.single_track.yaw_inertia_kgm2, SplitTorques(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
-        """Return the wheel torques."""
+        """Return the torques to add at the wheels of the electric axles."""
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)

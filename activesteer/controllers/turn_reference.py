@@ -65,7 +65,7 @@ def _desired(block: TurnReference, angle_rad: float) -> float:
 
 
 class BorneTurnReference(TurnReference):
-    """Desired yaw rate that falls where the measured lateral acceleration shows that the road does not bear the turn.
+    """Desired yaw rate that falls if the measured lateral acceleration is less than the turn requires.
 
     A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
     measured |a_y| is short of v |r*| by more than D, the desired yaw rate r* falls by the rest over v, at most to zero.

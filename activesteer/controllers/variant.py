@@ -35,7 +35,7 @@ class VariantFile(ControllerParameters):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant that can be made for any car.
+    """A variant that can be created for any car.
 
     Attributes:
         name: Short name.
@@ -91,7 +91,7 @@ class Variant:
 
 
 def read_variant(given: str | os.PathLike[str]) -> Variant:
-    """Read a variant.
+    """Read a controller variant by its name or its file.
 
     Args:
         given: Name, or path of a variant file.

@@ -1,4 +1,4 @@
-"""A child process that runs native code of others, which may crash, hang or answer nonsense without harm to this one.
+"""A child process for foreign native code, which may crash, hang or return invalid data without harm to this process.
 
 This file imports nothing of the package: run as a program, it is the child process.
 """
@@ -29,7 +29,7 @@ _PIECE_BYTES: Final = 1 << 20
 
 
 class ChildFault(Exception):  # noqa: N818 - a fault of the child
-    """A child process crashed, hung or answered nonsense: what it did, in words."""
+    """A child process crashed, hung or returned invalid data. The message says which."""
 
 
 class Child:
@@ -50,7 +50,7 @@ class Child:
 
     @property
     def alive(self) -> bool:
-        """True while the child can be asked."""
+        """True while the child can answer requests."""
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:
@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return the reason why there is no answer, or None for an exception that is not the child's."""
+        """Return the reason for a missing answer, or None for an exception that is not the child's."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)

@@ -130,7 +130,7 @@ def is_folder(path: str | os.PathLike[str]) -> bool:
 
 
 def why_no_file(path: str | os.PathLike[str]) -> str:
-    """Return why a path is not a file, for an error message."""
+    """Return the reason why a path is not a file, for an error message."""
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
@@ -173,7 +173,7 @@ def read_text(
 
 
 class CsvRow(NamedTuple):
-    """Row of a CSV."""
+    """Row of a CSV file, with its line number."""
 
     line: int  # line in the file, from 1
     cells: list[str]  # cells without surrounding blanks

@@ -93,13 +93,13 @@ MAX_LIST_ELEMENTS: Final = 1_000_000
 
 
 def check_count(count: int, most: int, what: str, error: type[ActiveSteerError], **place: Any) -> None:
-    """Refuse more than `most`."""
+    """Reject a count above `most`."""
     if count > most:
         raise error(f"has {count} {what}, at most {most} are allowed", value=count, allowed=most, **place)
 
 
 def check_number(value: float, error: type[ActiveSteerError], *, text: Any = None, **place: Any) -> None:
-    """Refuse a number that is not finite or above `MAX_NUMBER`."""
+    """Reject a number that is not finite or above `MAX_NUMBER`."""
     given = value if text is None else text
     if not math.isfinite(value):
         raise error(f"{shown(given)} is not a finite number", value=given, **place)
@@ -121,14 +121,14 @@ def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
 
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
-    """Return which values are above `MAX_NUMBER`, or only the finite ones of them if `infinite`."""
+    """Return the mask of the values above `MAX_NUMBER`, or only of the finite ones if `infinite`."""
     # A nan is a missing value, and a run that diverged may hold infinity.
     size = abs(values)
     return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER
 
 
 def check_numbers(values: Any, error: type[ActiveSteerError], *, infinite: bool = False, **place: Any) -> None:
-    """Refuse values above `MAX_NUMBER` (see `too_large`)."""
+    """Reject values above `MAX_NUMBER` (see `too_large`)."""
     wrong = too_large(values, infinite=infinite)
     if wrong.any():
         check_number(float(values[wrong].flat[0]), error, **place)

@@ -1,4 +1,4 @@
-"""Every metric that the package evaluates: its unit for display, the difference that counts, its preferred direction.
+"""Table of all metrics: display unit, smallest difference that counts, and preferred direction.
 
 A metric is declared here once. An evaluation that returns another name is an error; see `analysis.metrics`.
 

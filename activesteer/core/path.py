@@ -84,11 +84,11 @@ class Path:
 
     @property
     def length_m(self) -> float:
-        """Arc length [m]."""
+        """Arc length of the whole path [m]."""
         return float(self.s_m[-1])
 
     def extended(self, by_m: float) -> tuple[Array, Array]:
-        """Append one point, straight ahead beyond the end."""
+        """Return x and y with one more point, straight ahead beyond the end."""
         end = self.heading_rad[-1]
         x = np.append(self.x_m, self.x_m[-1] + by_m * math.cos(end))
         return x, np.append(self.y_m, self.y_m[-1] + by_m * math.sin(end))

@@ -212,7 +212,7 @@ class Setpoint(NamedTuple):
 
 
 class DriverCommand(NamedTuple):
-    """Command of the driver.
+    """Command of the driver: steering, pedals, and the demand of the manoeuvre.
 
     Attributes:
         steering_wheel_demand_rad: Steering wheel angle [rad], left positive.

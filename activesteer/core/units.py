@@ -214,7 +214,7 @@ _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """Return a text of numbers for a page: minus signs instead of hyphens, none before zero, and m/s² as such."""
+    """Return a text of numbers for a page, with minus signs, without a minus before zero, and with m/s²."""
     return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
 
 

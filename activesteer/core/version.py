@@ -1,4 +1,4 @@
-"""The version of the package: the one place where it is written (pyproject.toml reads it from here)."""
+"""Version of the package, which pyproject.toml reads from this module."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ class BodySurface(NamedTuple):
 def dressed(
     parts: Sequence[ScenePart], size: Footprint | None
 ) -> tuple[tuple[ScenePart, ...], tuple[BodySurface, ...]]:
-    """Return a car with a body and wheels."""
+    """Return the parts of a car and, if its size is known, the surfaces of its body and wheels."""
     if size is None:
         return tuple(parts), ()
     solids = [part for part in parts if isinstance(part, Primitive)]

@@ -28,10 +28,10 @@ _LEAST_LOAD_N: Final = 1.0
 
 
 class Channels(Protocol):
-    """A recorded run."""
+    """A recorded run, with channels by name."""
 
     def __getitem__(self, name: str, /) -> Any:
-        """Return a channel."""
+        """Return the values of a channel."""
         ...
 
 
@@ -67,7 +67,7 @@ class Line(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A panel over time.
+    """A panel of signals over time.
 
     One run has the colours of its lines. Several runs have a colour each; the first line of a run is full, and views
     on paper draw the others dotted.

@@ -1,4 +1,4 @@
-"""The driver: from the setpoint, and the path ahead, to steering wheel, drive and brake.
+"""The driver: steering wheel, drive and brake from the setpoint and the path ahead.
 
 In: the setpoint of a manoeuvre, the measurement, and the motion of the car.
 Out: steering wheel angle, drive torque, brake pedal and gear.

@@ -73,7 +73,7 @@ class SpeedHold(NativeBlock):
 def drive_torque(
     hold: SpeedHold, speed_demand_mps: float, speed: float, engine_radps: float, low: float, high: float
 ) -> float:
-    """Law of `SpeedHold.step`."""
+    """Law of `SpeedHold.step`: the total torque at the driven wheels."""
     if speed_demand_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
         take_foot_off(hold)
         return 0.0
@@ -105,7 +105,7 @@ def drive_torque(
 
 @shared
 def take_foot_off(hold: SpeedHold) -> None:
-    """Law of `SpeedHold.reset`."""
+    """Law of `SpeedHold.reset`: clear the integral."""
     hold._integral_Nm = 0.0
     hold._pedal = 1.0
     hold.saturated = False

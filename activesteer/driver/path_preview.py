@@ -154,7 +154,7 @@ class PathPreviewDriver(NativeBlock):
 
 @shared
 def looks(speed_mps: float) -> bool:
-    """Return whether a driver looks ahead at a speed [m/s] instead of holding the steering wheel."""
+    """Return whether a driver looks ahead at a speed [m/s] and does not hold the steering wheel."""
     return speed_mps >= _MIN_SPEED_MPS
 
 

@@ -154,7 +154,7 @@ def _filter(known, tyres, memory, said, line):
 
 @compiled
 def _predict_present(known, tyres, memory, line):
-    """Advance only the model from the time of the filters to the present, with the later angles."""
+    """Advance only the model from the time of the filters to the current time, with the later angles."""
     now, count, length = memory.now, memory.calls, len(line)
     for index in range(N_STATES):
         now[index] = memory.state[index]

@@ -105,7 +105,7 @@ def titles() -> dict[str, str]:
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the list of a file and the ending of its name there, without executing its code."""
+    """Yield the list that a file belongs to and the ending of its name, without executing its code."""
     text = file.read_text("utf-8")
     if file.suffix == ".toml":
         table = tomllib.loads(text)

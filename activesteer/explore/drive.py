@@ -39,7 +39,7 @@ _PLANE: Final = "straight_line"
 
 
 class DrivingCourse(NamedTuple):
-    """A place to drive."""
+    """A course for driving by hand: road, start speed and friction."""
 
     title: str  # its name in words
     maneuver: Any  # manoeuvre whose road and course it has
@@ -108,7 +108,7 @@ def _towards(value: float, target: float, most: float) -> float:
 
 
 class DriveSession:
-    """A car that waits at the start of a course, and its drive in real time, recorded to the file `path`."""
+    """A car that waits at the start of a course, and its drive in real time, recorded to a file."""
 
     def __init__(self, choice: Start, folder: Folder, pacer: FramePacer | None = None) -> None:
         """Put the car at the start of a course."""
@@ -160,7 +160,7 @@ class DriveSession:
         yield self._picture()
 
     def go(self) -> Reply:
-        """Let the car drive from now on, recorded to a new file."""
+        """Start the drive, recorded to a new file."""
         self.path = free_path(self._folder.path, f"drive_{self._name}", ".mcap")
         self._files.enter_context(self._simulation.recorded_to(self.path))
         return Reply({"kind": "going", "file": self.path.name})
@@ -241,7 +241,7 @@ class DriveSession:
         return math.atan2(motion.y_m - self._course.radius_m, motion.x_m)
 
     def _time_laps(self) -> None:
-        """Time laps of the circle, or the way from the first gate to the last."""
+        """Measure the time of a lap of the circle, or from the first gate to the last one."""
         now_s, course = self._simulation.time_s, self._simulation.scenario.maneuver.course
         if self._course.radius_m:
             bearing = self._bearing()
@@ -263,7 +263,7 @@ class DriveSession:
                     self._last_lap_s = self._lap_s
 
     def _look_for_missed_gates(self, course: Course) -> None:
-        """Note if the car has passed a cone that stands on the other side of the course's path."""
+        """Record if the car has passed a cone on the wrong side."""
         x_m, y_m = (self._simulation.truth[f"front_axle_{axis}_m"] for axis in "xy")
         cones = self._cones()
         passed_x_m, passed_y_m = cones[(self._front_x_m < cones[:, 0]) & (cones[:, 0] <= x_m)].T

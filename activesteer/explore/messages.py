@@ -77,7 +77,7 @@ class Report(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", 
 
 
 class End(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="end"):
-    """The drive ends."""
+    """Request of the page to end the drive."""
 
 
 Message = Describe | RunRequest | Start | Act | Save | Report | End
@@ -95,7 +95,7 @@ def read(text: str | bytes) -> Message:
 
 
 def add(waiting: deque[Message], message: Message) -> bool:
-    """Append a message to a queue, where it replaces an older one of the same meaning.
+    """Append a message to a queue, or replace an older message with the same meaning.
 
     Return False if it is full.
 

@@ -77,7 +77,7 @@ _COVERED: Final = ("controllers", "single_track", "two_track")
 
 
 class Slider(NamedTuple):
-    """A slider."""
+    """A slider of the page, with its key and range."""
 
     key: str  # key as `--set` takes it
     label: str  # label in words, without its group
@@ -130,7 +130,7 @@ def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
 
 
 def _moves(scenario: Scenario, key: str, value: Any) -> bool:
-    """Return whether a slider of a key has an effect at a value: `road.mu` has none on a road with two sides."""
+    """Return whether the slider of a key has an effect at a value."""
     owner, _, name = key.rpartition(".")
     return _is_number(value) and not (owner and is_overruled(value_of(scenario, owner), name))
 
@@ -140,7 +140,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
-    """Return the slider of a gain, from zero to some multiples of its value, or None if it is no number."""
+    """Return the slider of a gain, from zero to some multiples of its value, or None for a value that is no number."""
     if not _is_number(declared.default):
         return None
     tables, _, name = key.rpartition(".")

@@ -243,7 +243,7 @@ class ExploreServer:
 
 
 def _packed(header: dict[str, Any], arrays: list[Any]) -> bytes:
-    """Return a message: length, JSON, and behind it the arrays as numbers of 32 bits."""
+    """Return a message: length, JSON, and then the arrays as numbers of 32 bits."""
     text = json.dumps(finite({**header, "arrays": [list(shape) for shape, _ in arrays]}), allow_nan=False).encode()
     text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
     return struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays)

@@ -127,7 +127,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return simulation.recording()
 
     def close(self) -> None:
-        """Close window and canvas."""
+        """Close the window or the canvas."""
         if self._picture is not None:
             self._picture.close()
             self._picture = None

@@ -40,7 +40,7 @@ _POPULATION: Final = "population"
 
 @dataclass(frozen=True)
 class Task:
-    """A task.
+    """A task for an agent: manoeuvre, driver, actuators and reward.
 
     Attributes:
         maneuver: Name of the manoeuvre.

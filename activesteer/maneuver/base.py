@@ -97,12 +97,12 @@ class Maneuver(ABC):
         return None
 
     def sequence(self) -> Any:
-        """Return what follows the car through the phases of one run, or None if setpoints depend only on time."""
+        """Return the object that follows the car through the phases of a run, or None without such phases."""
         return None
 
     @property
     def ground(self) -> Road:
-        """The road as the car drives on it: its friction laid along the path of the course if it follows that path."""
+        """Road as the car drives on it, with its friction laid along the course if the road follows it."""
         return self.road.laid(self.course)
 
     @property
@@ -246,7 +246,7 @@ _ROAD_FILES: Final = (
 def with_files(
     kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Return a table with the values of the files that it names, and the CSV files, to be kept with the recording.
+    """Return a table with the values of its files, and the CSV files that the recording keeps.
 
     A table without a file has no `folder`, and may have both the name of a file and values. It comes from a recording,
     and the values are those that were read then, unless an override names another file.

@@ -19,7 +19,7 @@ from activesteer.road.course import Course
 
 @dataclass(frozen=True)
 class TurnInput(StepInput):
-    """The steering wheel at the entry of the turn."""
+    """Steering wheel input at the entry of the turn."""
 
     rate_radps: Annotated[float, Range(0.1, 50.0)] = math.radians(60.0)
     """Steering wheel rate [rad/s]."""
@@ -27,7 +27,7 @@ class TurnInput(StepInput):
 
 @dataclass(frozen=True)
 class BrakeInput:
-    """The brake pedal."""
+    """Brake pedal input."""
 
     pedal: Annotated[float, Range(0.0, 1.0)]
     """Pedal position [-]."""
@@ -81,7 +81,7 @@ class BrakeInTurn(Maneuver, kind="brake_in_turn"):
         return steady_turn_search(self, step, accept)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Ramp of the steering wheel, then ramp of the brake (see the base class)."""
+        """Return the ramp of the steering wheel, then the ramp of the brake (see the base class)."""
         turn, brake = self.turn, self.brake
         amplitude = turn.steering_wheel_rad or 0.0
         turned = within((time_s - turn.start_s) * turn.rate_radps, abs(amplitude))
@@ -116,7 +116,7 @@ class StraightBraking(Maneuver, kind="straight_braking"):
         return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0])) if self.hold_line else None
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Speed, then the ramp of the brake (see the base class)."""
+        """Return the speed, then the ramp of the brake (see the base class)."""
         brake, (before, after) = self.brake, self._ends
         if time_s < brake.start_s:
             return before

@@ -235,7 +235,7 @@ class ConstantRadius(Maneuver, kind="constant_radius"):
             )
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Curvature and speed (see the base class)."""
+        """Return curvature and speed (see the base class)."""
         circle = self.circle
         fraction = within(time_s / circle.entry_s, 1.0)
         # Half a wave of a cosine: the curvature has no kink at the beginning and the end of the rise.
@@ -245,5 +245,5 @@ class ConstantRadius(Maneuver, kind="constant_radius"):
         return Setpoint(0.0, speed, 0.0, True, curvature)
 
     def settling_setpoint(self) -> Setpoint:
-        """Straight ahead, with the curvature as the setpoint."""
+        """Return the setpoint at time zero, which is straight ahead."""
         return self.setpoint(0.0)

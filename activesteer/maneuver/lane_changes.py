@@ -78,10 +78,10 @@ class AlongCourse(Maneuver):
     @cached_property
     @abstractmethod
     def course(self) -> Course:
-        """Path, lanes and cones."""
+        """Path, lanes and cones of the course."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Path and speed."""
+        """Return the path and the speed (see the base class)."""
         return self._setpoint
 
     @cached_property
@@ -269,7 +269,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
     """Width of the vehicle, for which the lanes are laid out [m]. Default: the width in the vehicle file."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Path and speed, or the path without throttle."""
+        """Return the path and the speed, or the path without throttle."""
         return self._setpoint if time_s < self._throttle_off_s else self._coasting
 
     @cached_property
@@ -384,7 +384,7 @@ class Slalom(AlongCourse, kind="slalom"):
 
     @cached_property
     def course(self) -> Course:
-        """Path and cones."""
+        """Path and cones of the slalom."""
         row, width = self.cones, known_width(self.vehicle_width_m)
         if row.offset_m <= 0.5 * width:
             raise ManeuverError(

@@ -19,7 +19,7 @@ from activesteer.maneuver.base import DriveMode, Maneuver, NamedFile, read_colum
 
 @dataclass(frozen=True)
 class SteeringTable:
-    """Steering wheel angle or rack position over time."""
+    """Table of the steering wheel angle or rack position over time."""
 
     time_s: tuple[float, ...] = (0.0,)
     """Times, increasing [s]; linear between them, constant outside."""
@@ -53,7 +53,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class SpeedTable:
-    """Speed to hold over time."""
+    """Table of the speed to hold over time."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -63,7 +63,7 @@ class SpeedTable:
 
 @dataclass(frozen=True)
 class BrakeTable:
-    """Brake pedal over time."""
+    """Table of the brake pedal over time."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -73,7 +73,7 @@ class BrakeTable:
 
 @dataclass(frozen=True)
 class ParkingBrakeTable:
-    """Parking brake over time."""
+    """Table of the parking brake over time."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -83,7 +83,7 @@ class ParkingBrakeTable:
 
 @dataclass(frozen=True)
 class SensorOffsetTable:
-    """Offsets of the sensors of a repeated measurement: what each sensor shows, less the true value."""
+    """Offsets of the sensors in a repeated measurement: readings minus true values."""
 
     yaw_rate_radps: float = 0.0
     """Of the yaw rate [rad/s]."""
@@ -101,7 +101,7 @@ class SensorOffsetTable:
 
 @dataclass(frozen=True)
 class WheelTorqueTable:
-    """Torques of each wheel over time, zero for a missing column."""
+    """Table of the torques of each wheel over time, zero for a missing column."""
 
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
@@ -192,7 +192,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
     )
 
     def __post_init__(self) -> None:
-        """Check the tables."""
+        """Check that the tables fit together and last long enough."""
         others = {"speed": self.speed, "brake": self.brake, "parking_brake": self.parking_brake}
         if self.wheel_torques is not None and any(others.values()):
             raise ManeuverError("cannot be given together with a speed or a brake", key="wheel_torques")
@@ -206,7 +206,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
             self._check_end("wheel_torques", self.wheel_torques.time_s)
 
     def _check_end(self, key: str, times_s: tuple[float, ...]) -> None:
-        """Refuse a table that is shorter than the manoeuvre, unless `hold_last` is set."""
+        """Reject a table that is shorter than the manoeuvre, unless `hold_last` is set."""
         if len(times_s) > 1 and times_s[-1] < self.duration_s and not self.hold_last:
             problem = (
                 f"ends at {times_s[-1]:g} s, before duration_s = {self.duration_s:g}; add points, shorten duration_s, "
@@ -215,7 +215,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
             raise ManeuverError(problem, key=f"{key}.time_s", value=times_s[-1])
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Values of the tables (see the base class)."""
+        """Return the values of the tables (see the base class)."""
         steering = self.steering
         value = steering.factor * _interpolate(time_s - steering.delay_s, steering.time_s, steering.values)
         angle, rack = (value, None) if self.steering.rack_m is None else (0.0, value)
@@ -229,7 +229,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
         return new_message(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
     def settling_setpoint(self) -> Setpoint:
-        """Setpoint of the start, but without wheel torques: the car drives at its speed."""
+        """Return the setpoint of the start without wheel torques, in which the car may hold its speed."""
         setpoint = self.setpoint(0.0)
         if self.wheel_torques is None:
             return setpoint

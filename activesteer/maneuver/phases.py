@@ -1,4 +1,4 @@
-"""Phases: inputs that follow each other when the car does something, not only at given times.
+"""Phases: inputs that follow each other when the car reaches a state, not only at given times.
 
 Each phase moves steering wheel, speed and pedals to its values and ends by its condition. So a manoeuvre can react to
 the car: the fishhook steers back when the roll rate has died away.
@@ -153,7 +153,7 @@ class Phases(Maneuver, kind="phases"):
     """A, the angle of `steering_factor = 1` [rad]. Default: a search finds it."""
 
     def __post_init__(self) -> None:
-        """Check the phases."""
+        """Check that there are phases and that the keys fit together."""
         if not self.phases:
             raise ManeuverError("at least one phase [[phases]] is needed", key="phases")
         if self._needs_reference:
@@ -177,7 +177,7 @@ class Phases(Maneuver, kind="phases"):
         return PhaseSequence(self)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Setpoint of phases that end only by their times and inputs."""
+        """Return the setpoint of phases that end only by their times and inputs."""
         # A run uses `sequence`, which sees the car.
         sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
@@ -186,7 +186,7 @@ class Phases(Maneuver, kind="phases"):
                 return setpoint
 
     def settling_setpoint(self) -> Setpoint:
-        """Straight ahead, as the first phase drives."""
+        """Return the setpoint straight ahead, with drive and brake of the first phase."""
         first = self.phases[0]
         setpoint = self.at_speed(0.0, first.drive != "coast")
         return setpoint._replace(brake_pedal=first.brake_pedal or 0.0) if self.speed_mps == 0.0 else setpoint

@@ -23,7 +23,7 @@ _SEARCH_S: Final = 4.5
 
 @dataclass(frozen=True)
 class StepInput:
-    """The step at the steering wheel."""
+    """Step input at the steering wheel."""
 
     OVERRULED: ClassVar = {"lateral_acceleration_mps2": {"steering_wheel_rad": None}}
 
@@ -58,7 +58,7 @@ class StepSteer(Maneuver, kind="step_steer"):
         check_begin("steer.start_s", self.steer.start_s, self.duration_s)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the ramp (see the base class)."""
+        """Return the steering wheel angle of the ramp (see the base class)."""
         step, (before, after) = self.steer, self._ends
         turned = (time_s - step.start_s) * step.rate_radps
         if turned <= 0.0:
@@ -100,7 +100,7 @@ Frequency = Annotated[float, Range(0.01, 50.0)]
 
 @dataclass(frozen=True)
 class Sweep:
-    """The sweep at the steering wheel, with a frequency that rises by the same factor every second."""
+    """Sweep input at the steering wheel, with a frequency that rises by the same factor every second."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """Time at which the sweep begins [s]."""
@@ -144,7 +144,7 @@ class SineSweep(Maneuver, kind="sine_sweep"):
             )
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the sweep (see the base class)."""
+        """Return the steering wheel angle of the sweep (see the base class)."""
         sweep = self.sweep
         t = time_s - sweep.start_s
         angle = 0.0
@@ -160,7 +160,7 @@ class SineSweep(Maneuver, kind="sine_sweep"):
 
 @dataclass(frozen=True)
 class SlowRamp:
-    """The ramp of the steering wheel."""
+    """Ramp input at the steering wheel."""
 
     start_s: Annotated[float, Range(0.0)] = 0.5
     """Time at which the steering wheel begins to turn [s]."""
@@ -184,7 +184,7 @@ class SlowlyIncreasingSteer(Maneuver, kind="slowly_increasing_steer"):
             raise ManeuverError("rate_degps and end_deg must not be 0: the steering wheel would not turn", key="steer")
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the ramp (see the base class)."""
+        """Return the steering wheel angle of the ramp (see the base class)."""
         ramp = self.steer
         turned = within((time_s - ramp.start_s) * abs(ramp.rate_radps), ramp.end_rad)
         return self.at_speed(math.copysign(turned, ramp.rate_radps))
@@ -200,7 +200,7 @@ _LINES: Final = 5
 
 @dataclass(frozen=True)
 class RandomSignal:
-    """The steering wheel angle: normally distributed, with the same power at all frequencies of a band."""
+    """Random steering wheel angle: normally distributed, with the same power at all frequencies of a band."""
 
     rms_rad: Annotated[float, Range(0.0, 5.0)] = math.radians(8.0)
     """Root mean square [rad]. Peaks are three to four times as large."""
@@ -250,7 +250,7 @@ class RandomSteer(Maneuver, kind="random_steer"):
         return angles.tolist()
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle (see the base class)."""
+        """Return the steering wheel angle (see the base class)."""
         place = max(time_s, 0.0) / _STEP_S
         index = min(int(place), len(self._angles_rad) - 2)
         before, after = self._angles_rad[index], self._angles_rad[index + 1]
@@ -276,7 +276,7 @@ def reference_angle_search(maneuver: Maneuver, accept: Callable[[float], Maneuve
 
 @dataclass(frozen=True)
 class DwellInput:
-    """The sine with dwell at the steering wheel."""
+    """Sine with dwell at the steering wheel."""
 
     OVERRULED: ClassVar = {"amplitude_factor": {"steering_wheel_rad": None}}
 
@@ -344,7 +344,7 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Steering wheel angle of the sine (see the base class)."""
+        """Return the steering wheel angle of the sine (see the base class)."""
         steer, (before, after) = self.steer, self._ends
         t = time_s - steer.start_s
         if t < 0.0:

@@ -43,7 +43,7 @@ class CircleValidation(NamedTuple):
         return self.numbers["inside"]
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the result as JSON values."""
         return self.numbers
 
 
@@ -143,7 +143,7 @@ def steering_wheel_deg(vehicle: str, case: Mapping[str, Any], roll_per_ay: float
 
 
 def _on_circle(vehicle: str, case: Mapping[str, Any], ay_mps2: float, channel: str) -> float:
-    """Return the size of a channel at a lateral acceleration on the circle, a rack as its steering wheel angle."""
+    """Return the magnitude of a channel at a lateral acceleration on the circle, rack travel as a wheel angle."""
     slow, fast = (math.sqrt((ay_mps2 + beside) * case["radius_m"]) for beside in (-0.4, 0.2))
     overrides = {
         **{key: value for key, value in case.items() if key not in CIRCLE_KEYS},

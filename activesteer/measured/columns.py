@@ -44,7 +44,7 @@ class Column(NamedTuple):
 
 
 def check_rows(count: int, path: Path) -> None:
-    """Refuse a file with too many rows, which its metadata state before the rows are read."""
+    """Reject a file whose metadata state too many rows, before the rows are read."""
     limits.check_count(count, limits.MAX_ROWS, "rows", RecordingError, file=path.name)
 
 

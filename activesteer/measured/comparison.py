@@ -190,7 +190,7 @@ TOLERANCES: Final = {
 
 
 class Compared(NamedTuple):
-    """Comparison of one channel."""
+    """Comparison of one channel: measured and simulated values, and the tolerance."""
 
     channel: str  # name of the channel
     tolerance: Tolerance  # allowed difference
@@ -220,7 +220,7 @@ class Compared(NamedTuple):
         return self.share_inside >= SHARE_NEEDED
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
+        """Return the comparison of the channel as JSON values, SI."""
         return {
             "channel": self.channel,
             "rms": rms(self.residual),
@@ -235,7 +235,7 @@ class Compared(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """Result of a comparison."""
+    """Comparison of measured runs with a simulation."""
 
     standard: str  # key of `STANDARDS`
     shifts_s: tuple[float, ...]  # delay of each measured run [s]; nan if unknown, and then not corrected
@@ -249,7 +249,7 @@ class Comparison(NamedTuple):
         return all(quantity.inside for quantity in self.quantities)
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
+        """Return the comparison as JSON values, SI."""
         return {
             "standard": self.standard,
             "time_shift_s": float(np.mean(self.shifts_s)),
@@ -338,7 +338,7 @@ def _crossed(
     name: str, tolerance: Tolerance, across: Array, measured: Array, confidence: Array,
     curve: tuple[Array, Array, Array], noise: float,
 ) -> Compared:  # fmt: skip
-    """Compare in a cross plot: inside is a point in the ellipse of both tolerances around a point of the curve."""
+    """Compare in a cross plot, where a point inside lies in the ellipse of both tolerances around a curve point."""
     rows, places = (
         np.unique(np.linspace(0, count - 1, min(count, _CROSS_POINTS)).astype(int))
         for count in (len(across), len(curve[0]))

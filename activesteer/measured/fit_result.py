@@ -29,7 +29,7 @@ standard deviation would be twice the range."""
 
 
 def autocorrelation_time(values: Array) -> float:
-    """Return the number of neighbouring samples that are worth one independent sample, or 1 for white noise.
+    """Return the number of neighbouring samples equivalent to one independent sample, 1 for white noise.
 
     The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
     subtracted: an offset is no noise.
@@ -136,7 +136,7 @@ class Parameter(NamedTuple):
         return f"{self.value:.{digits}f} +- {self.half_width:.{digits}f}"
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the parameter as JSON values."""
         low, high = self.value - self.half_width, self.value + self.half_width
         return {"value": self.value, "low": low, "high": high, "start": self.start, "range": [self.low, self.high],
                 "at_end": self.at_end}  # fmt: skip
@@ -155,7 +155,7 @@ class Compared(NamedTuple):
     independent: float  # number of independent samples
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
+        """Return the compared channel as JSON values, SI."""
         return {
             "recording": self.recording,
             "channel": self.channel,
@@ -168,7 +168,7 @@ class Compared(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Result of a fit."""
+    """Result of a fit: parameters, their uncertainty, and the compared channels."""
 
     parameters: tuple[Parameter, ...]  # fitted factors
     correlations: Array  # correlations of the parameters' errors, shape (p, p); nan at an end of a range
@@ -184,7 +184,7 @@ class Fit(NamedTuple):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Warnings, one sentence each."""
+        """Warnings about the fit, one sentence each."""
         found = []
         if not self.settled:
             found.append(f"the search did not converge in {self.rounds} rounds; restart it from its end (fit.start)")
@@ -228,7 +228,7 @@ class Fit(NamedTuple):
         return tuple(found)
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the fit as JSON values."""
         return {
             "parameters": {one.key: one.to_json() for one in self.parameters},
             "correlations": self.correlations.tolist(),

@@ -140,7 +140,7 @@ Answer = list[Array] | str
 
 
 class Found(NamedTuple):
-    """End of the search."""
+    """Result of the search for the parameters."""
 
     place: Array  # parameters, shape (p,)
     before: list[Array]  # differences at the start, a series per channel and recording

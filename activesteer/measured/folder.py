@@ -1,4 +1,4 @@
-"""A car against the measured runs of a folder: predicted, fitted, checked.
+"""Validation of a car against the measured runs of a folder: prediction, fit and check.
 
 The *prediction* uses the vehicle file; of the factors, only those in `predict.factors` are free. The *fit* frees all
 factors. Both see the fit windows alone and are judged in the check windows. The band around the prediction contains
@@ -44,7 +44,7 @@ class Part(NamedTuple):
     band: tuple[Array, Array] | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
+        """Return the part as JSON values, SI."""
         return {"run": self.run, "part": self.part, "stage": self.stage, **self.compared.to_json()}
 
     def box(self) -> dict[str, Any]:
@@ -57,7 +57,7 @@ class Part(NamedTuple):
 
 
 class End(NamedTuple):
-    """Effect of an interval."""
+    """Effect of both ends of an interval on the prediction."""
 
     key: str  # key of the value
     source: str  # where its ends come from
@@ -90,7 +90,7 @@ class MeasuredValidation:
         return all(one.compared.inside for one in self.judged)
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, SI."""
+        """Return the result as JSON values, SI."""
         return {
             "vehicle": self.file.table.vehicle, "title": self.file.table.title, "inside": self.inside,
             "predicted": None if self.predicted is None else self.predicted.to_json(),
@@ -212,7 +212,7 @@ class _Case:
             raise self.file.source.fail(where, reason.problem, reason.value, reason.allowed) from reason
 
     def runs(self, overrides: Mapping[str, Any]) -> dict[str, Recording]:
-        """Drive all runs."""
+        """Drive all runs with these overrides, and return their recordings by name."""
         values = {**SPEED_HOLD, **self.file.table.overrides, **overrides}
         return {
             name: simulate(str(self._scratch / f"{name}.mcap"), "none", self.file.vehicle, values)

@@ -32,7 +32,7 @@ Window = tuple[float, ...]
 
 @dataclass(frozen=True)
 class RunTable:
-    """A measured run."""
+    """Table of a measured run: its files, map and windows."""
 
     name: str
     """Its name."""
@@ -72,7 +72,7 @@ class PredictTable:
 
 @dataclass(frozen=True)
 class IntervalTable:
-    """A value with an unknown true value."""
+    """A value that is known only within an interval."""
 
     source: str
     """Where its ends come from."""
@@ -86,7 +86,7 @@ class IntervalTable:
 
 @dataclass(frozen=True)
 class CircleTable:
-    """A measured circle."""
+    """Table of a measured circle: path, lateral acceleration and measured angles."""
 
     radius_m: Annotated[float, Range(1.0)]
     """Radius of the path of the centre of gravity [m]."""
@@ -108,7 +108,7 @@ class CircleTable:
 
 @dataclass(frozen=True)
 class MeasuredTable:
-    """The file `validation.toml`."""
+    """Keys of the file `validation.toml`."""
 
     KEY_HINTS: ClassVar = dict.fromkeys(
         ("effects", "steps", "decisions"), "give values of the car in [circle.prediction] and [intervals]"
@@ -142,7 +142,7 @@ class MeasuredTable:
 
 @dataclass(frozen=True)
 class MeasuredFile:
-    """A checked file."""
+    """Checked file of a folder of measured runs."""
 
     table: MeasuredTable  # its table
     folder: Path  # its folder
@@ -305,7 +305,7 @@ def _quantities(
 
 
 def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any]) -> Any:
-    """Return the value of a key of the car or of a repeated measurement, or check only the overrides without a key."""
+    """Return the value of a key of the car or of a repeated measurement. Without a key, only check the overrides."""
     steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
     inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:

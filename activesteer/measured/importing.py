@@ -28,7 +28,7 @@ from activesteer.scenario import load_car
 
 @dataclass(frozen=True)
 class ChannelMap:
-    """Source of a channel."""
+    """Entry of a map file: source of a channel."""
 
     column: str
     """Name of the column."""
@@ -46,7 +46,7 @@ class ChannelMap:
 
 @dataclass(frozen=True)
 class MeasurementMap:
-    """Map file."""
+    """Map file of an import."""
 
     channels: dict[str, ChannelMap] = field(default_factory=dict)
     """Channel -> its source. By default, columns are recognised by their names."""
@@ -77,7 +77,7 @@ _MOST_REPEATED: Final = 5
 
 
 class _Source(NamedTuple):
-    """Source of a channel."""
+    """Source of a channel, matched with a column of a file."""
 
     column: Column
     unit: str  # unit of the column
@@ -288,7 +288,7 @@ def _signal(name: str, source: _Source, time_s: Array, values: Array, chosen: Me
 
 
 def _plausible(values: Array, column: str, path: Path) -> Array:
-    """Return the values if they are small enough for a file."""
+    """Return the values if a file may hold them."""
     limits.check_numbers(values, RecordingError, infinite=True, file=path.name, key=f"column {shown(column)}")
     return values
 

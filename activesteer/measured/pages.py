@@ -35,7 +35,7 @@ _SAME_TIME_S: Final = 0.05e-3
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:
-    """Return the page."""
+    """Return the page of a comparison."""
     shifts = f"Measured {', '.join(map(_shift, found.shifts_s))} than simulated; this shift is removed."
     if all(abs(shift_s) < _SAME_TIME_S for shift_s in found.shifts_s):
         shifts = "There is no time shift between measurement and simulation."

@@ -29,7 +29,7 @@ Entry = TypeVar("Entry")
 def by_channel(
     table: Mapping[str, Entry], known: Collection[str], source: Source, where: tuple[str, ...]
 ) -> dict[str, tuple[str, float, Entry]]:
-    """Return the entries of a table of a file by channel, each with its key and the factor of the key's unit to SI."""
+    """Return the entries of a table of a file by channel, each with its key and the factor of its unit to SI."""
     found: dict[str, tuple[str, float, Entry]] = {}
     for key, entry in table.items():
         name, factor = field_in_unit(key, known)

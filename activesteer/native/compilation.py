@@ -57,7 +57,7 @@ _import_array_functions()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Decorator: compile a function at its first call and keep the native code on disk.
+    """Return a decorator that compiles a function at its first call and keeps the native code on disk.
 
     Division by zero follows IEEE 754, as in numpy, and does not raise.
     """
@@ -69,7 +69,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Decorator: make native code part of each compiled function that calls it."""
+    """Make native code of a function part of each compiled function that calls it (a decorator)."""
     _know_shared()
     return njit(inline="always", error_model="numpy")(function)
 
@@ -81,7 +81,7 @@ def _know_shared() -> None:
 
 
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
-    """Decorator: compile a function now to a C function that the engine can call, and keep it on disk."""
+    """Return a decorator that compiles a function now to a C function for the engine, and keeps it on disk."""
 
     def decorate(function: Callable[..., Any]) -> CFunc:
         _know_shared()
@@ -96,7 +96,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 def compiled_call(
     result: types.Type, *arguments: types.Type, others_run: bool = True, about: tuple[str, Path] | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Decorator: compile a function now to native code with one signature.
+    """Return a decorator that compiles a function now to native code with one signature.
 
     Call it from Python only, with positional arguments; it does not inspect their types first.
     """
@@ -146,7 +146,7 @@ def call_at(result: types.Type, *arguments: types.Type) -> Any:
 
 
 class _ContentCache(FunctionCache):
-    """numba's cache of one function, under a name with the content key of all its sources."""
+    """Cache of numba for one function, under a name with the content key of all its sources."""
 
     def __init__(self, function: Callable[..., Any], about: tuple[str, Path] | None = None) -> None:
         super().__init__(function)

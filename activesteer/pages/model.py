@@ -1,4 +1,4 @@
-"""The parts of a page that is read from the top to the end: texts, tables, points and pictures in sections."""
+"""Parts of a page that is read from top to bottom: texts, tables, points and figures in sections."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ _NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N
 
 
 class Table(NamedTuple):
-    """A table.
+    """A table of a page.
 
     Attributes:
         title: Its title; empty for none.
@@ -179,7 +179,7 @@ class Table(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section.
+    """A section of a page.
 
     Its parts follow each other in the order of the attributes.
 
@@ -205,7 +205,7 @@ class Section(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page.
+    """A page with its head, lead and sections.
 
     Attributes:
         title: Title of the window.

@@ -48,7 +48,7 @@ def height(curves: Mapping[str, str]) -> float:
 
 
 def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]) -> None:
-    """Send a legend."""
+    """Send the legend of some curves: names and colours."""
     points = rr.Points2D(
         [(middle, (row + 0.5) * _ROW - _BELOW) for row, middle in _places(curves)],
         labels=list(curves),
@@ -77,7 +77,7 @@ _SHORTEST_S: Final = 0.05
 
 
 class Event(NamedTuple):
-    """Begin or end of a fault or a saturation, or a recorded event."""
+    """A begin or an end of a fault or a saturation, or a recorded event."""
 
     time_s: float
     text: str

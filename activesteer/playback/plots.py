@@ -103,7 +103,7 @@ def views(plots: Sequence[Panel], runs: Sequence[ReplayedRun]) -> list[rrb.TimeS
 
 
 def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float, float]:
-    """Return the range of an axis, chosen from a few so that different runs mostly share it."""
+    """Return the range of an axis from a few fixed ranges, so that most runs share it."""
     values = [
         run.channel(line.channel) * plot.quantity.factor
         for run in runs

@@ -222,7 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer that rerun-sdk installs, whatever the command `rerun` on the path is."""
+    """Return the viewer that rerun-sdk installs, regardless of the command `rerun` on the path."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")
@@ -235,7 +235,7 @@ def viewer_binary() -> Path:
 
 
 def _reason(log: str) -> str:
-    """Return the last error message of a viewer, without colour codes."""
+    """Return the last error message of a viewer without colour codes."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", log).splitlines() if line.strip()]
     if any("DISPLAY is set" in line or "connection to X server" in line for line in lines):
         return "there is no display"

@@ -1,4 +1,4 @@
-"""Plots: one model of a curve, a panel and a picture, drawn by matplotlib without a screen.
+"""Plots: one model of curves, panels and figures, drawn by matplotlib without a screen.
 
 In: numbers with names and units.
 Out: figures as PNG, PDF or SVG, and models of pictures for pages.

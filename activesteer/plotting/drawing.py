@@ -1,4 +1,4 @@
-"""Drawing of pictures."""
+"""Drawing of figures with matplotlib."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DOTS_PER_INCH: Final = 300
 
 
 def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
-    """Return an empty figure."""
+    """Return an empty matplotlib figure of a size."""
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:
@@ -68,7 +68,7 @@ _SCALE: Final = "viridis"
 
 
 def draw(picture: Picture) -> Figure:
-    """Draw a picture."""
+    """Draw the panels of a picture into a matplotlib figure."""
     count = len(picture.panels)
     columns = picture.columns or (2 if count == 4 else min(count, _BESIDE))
     rows = math.ceil(count / columns)

@@ -14,7 +14,7 @@ Dashes = str | tuple[float, tuple[float, ...]]
 
 
 class Curve(NamedTuple):
-    """A curve.
+    """A curve of a panel.
 
     Attributes:
         x: Abscissa, shape (n,).
@@ -62,7 +62,7 @@ class Area(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A pair of axes.
+    """A panel: a pair of axes with its curves.
 
     Attributes:
         x_label: Name and unit of the abscissa; empty where the panel below has the same abscissa.

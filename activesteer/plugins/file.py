@@ -113,7 +113,7 @@ class _Neighbours:
     @classmethod
     @contextmanager
     def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
-        """Load modules anew, those of a folder first, and afterwards only where there is no other."""
+        """Load modules anew: in this context first from a folder, and afterwards only if no other is found."""
         names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
         loaded = [name for name in sys.modules if name.partition(".")[0] in names]
         others = {name: sys.modules[name] for name in loaded if not is_user_module(name)}

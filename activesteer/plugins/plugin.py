@@ -30,7 +30,7 @@ _EMPTY: Final = inspect.Parameter.empty
 
 
 class Declared(NamedTuple):
-    """A declared parameter."""
+    """A declared parameter of a user's block."""
 
     default: Any = None  # None if there is none
     unit: str = ""  # unit of the value; empty for a pure number
@@ -125,7 +125,7 @@ def _parts(annotation: Any) -> tuple[Any, ...]:
 
 
 def _hint(hint: Any, default: Any) -> Any:
-    """Return the type of an annotation if it can be checked, else the type of the default, else `Any`."""
+    """Return the type of an annotation if it can be checked. Otherwise return the type of the default, or `Any`."""
     if hint is _EMPTY:
         kind = type(default)
         return float | int if kind in (float, int) else kind if kind in (bool, str) else Any
@@ -159,7 +159,7 @@ class Plugin:
     is_builtin: bool = False
 
     def __post_init__(self) -> None:
-        """Mark a block that uses the truth in its label, once also if the block is a copy."""
+        """Mark in its label that a block uses the truth, and only once for a copy of a block."""
         if self.uses_truth and not self.label.endswith("+truth"):
             object.__setattr__(self, "label", f"{self.label}+truth")
 
@@ -316,7 +316,7 @@ class Watched:
 
 
 def find(given: Any, kind: Kind) -> Plugin:
-    """Find a controller or driver, and check what can be checked before it is created.
+    """Find a controller or driver, and check it as far as possible before it is created.
 
     Args:
         given: A built-in name; `my_file.py:MyController`, with `?gain=2&limit_rad=0.05` for parameters; a class; an
@@ -352,7 +352,7 @@ def find(given: Any, kind: Kind) -> Plugin:
 
 
 def allowed(plugin: Plugin) -> Plugin:
-    """Return a plugin, but refuse a class with the name of a built-in block, or of a table of its keys."""
+    """Return a plugin, but reject a class with the name of a built-in block, or of a table of its keys."""
     if plugin.key in (reserved := (*plugin.kind.names(), *plugin.kind.reserved)):
         problem = f"a {plugin.kind.word} of your own cannot have the name {plugin.key!r}; rename it"
         raise plugin.kind.fail(plugin.name, problem, plugin.key, reserved)
@@ -360,7 +360,7 @@ def allowed(plugin: Plugin) -> Plugin:
 
 
 def is_instance(given: Any) -> bool:
-    """Return whether something is a block, not a class or function that creates one."""
+    """Return whether an object is a block, not a class or function that creates one."""
     return not isinstance(given, type) and callable(getattr(given, "step", None))
 
 

@@ -102,7 +102,7 @@ def _parts(value: Any) -> Mapping[Any, Any] | None:
 
 
 def _attributes(thing: Any) -> list[str]:
-    """Return the names of the attributes of an object itself."""
+    """Return the names of the attributes stored in an object itself."""
     slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ()) if name != "__dict__"]
     found = [*getattr(thing, "__dict__", ()), *(slots if not isinstance(thing, tuple) else ())]
     return [name for name in found if not name.startswith("__") and hasattr(thing, name)]

@@ -100,7 +100,7 @@ class BlockEncoder:
         return len(self._rows.layout)
 
     def _column_stretches(self, layout: FixedMessage) -> list[list[tuple[slice, slice]]]:
-        """For each run of channel values, return its parts that come from adjacent columns.
+        """Return, for each run of channel values, its parts that come from adjacent columns.
 
         numpy would copy the values first if it were given a list of columns.
         """
@@ -203,7 +203,7 @@ _OTHERS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 
 class Group(NamedTuple):
-    """Channels of a topic."""
+    """Channels that share a topic, and the layout of their messages."""
 
     topic: str  # name of the topic
     names: list[str]  # names of its fields
@@ -212,7 +212,7 @@ class Group(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Contents of a chunk."""
+    """Decoded contents of a chunk."""
 
     row_ns: NDArray[np.uint64]  # time of each row [ns], shape (n,)
     columns: Mapping[int, NDArray]  # column -> values, 32 or 64 bit, shape (n,)

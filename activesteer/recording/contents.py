@@ -35,7 +35,7 @@ _INFO: Final = 2
 
 
 class Event(NamedTuple):
-    """An event."""
+    """An event during a run, with its time and kind."""
 
     time_s: float  # time at which the next step began [s]
     # `set` for a changed key, `fail` for a fault, `phase` for a phase of the manoeuvre, `note` for a limit of

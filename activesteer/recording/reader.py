@@ -70,7 +70,7 @@ _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
 
 @dataclass
 class Records:
-    """Records of a file, chunks as places."""
+    """Records of a file, with the positions of its chunks."""
 
     position: int = len(MCAP0_MAGIC)  # end of the last record
     crc: int = zlib.crc32(MCAP0_MAGIC)  # checksum of all bytes up to `position`
@@ -86,7 +86,7 @@ class Records:
     _count: int = 0
 
     def read_next(self, descriptor: int, size: int) -> None:
-        """Read one record and move the position to its end, also if the record is broken."""
+        """Read one record, and move the position to its end even if the record is broken."""
         start, self.position = self.position, size + 1
         head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
         opcode, length = _RECORD.unpack(head)

@@ -302,7 +302,7 @@ class Recording:
         return len(self._time_s)
 
     def __repr__(self) -> str:
-        """Show size and duration."""
+        """Show the number of channels and rows, and the duration."""
         span = f"{self._time_s[0]:.3f} to {self._time_s[-1]:.3f} s" if len(self._time_s) else "no rows"
         return f"<Recording: {len(self._channels)} channels, {len(self._time_s)} rows, {span}>"
 

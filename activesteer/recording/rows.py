@@ -57,7 +57,7 @@ class Poses(NamedTuple):
     quaternions: NDArray[np.float64]
 
     def usable(self) -> NDArray[np.bool_]:
-        """Return which sets of poses can be drawn, shape (k,): plausible positions, quaternions with a direction."""
+        """Return the mask of the sets of poses that can be drawn, shape (k,): plausible positions and orientations."""
         near = (np.abs(self.positions_m) <= LIMIT_M).all(axis=(1, 2))
         size = np.linalg.norm(self.quaternions, axis=2)
         return near & ((size > _SMALLEST) & (size < 1.0 / _SMALLEST)).all(axis=1)
@@ -147,7 +147,7 @@ def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) ->
 
 
 class FileRows:
-    """Rows of an open file, also after it is replaced or deleted, but not after it is changed."""
+    """Rows of an open file, even after it is replaced or deleted, but not after it is changed."""
 
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]
@@ -162,7 +162,7 @@ class FileRows:
         weakref.finalize(self, _release, descriptor, self._token)
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the chunks."""
+        """Yield the decoded chunks in the order of the file."""
         for place in self._places:
             try:
                 data, crc = messages_of(read_bytes(self._descriptor, place.start, place.length))

@@ -123,7 +123,7 @@ class FixedMessage:
         return self.constant(tag(field, BYTES) + varint(len(data)) + data)
 
     def nested(self, field: int, message: FixedMessage) -> FixedMessage:
-        """Append a sub-message."""
+        """Append a sub-message with its own layout."""
         self.constant(tag(field, BYTES) + varint(len(message)))
         return self.append(message)
 
@@ -420,7 +420,7 @@ class ChannelTable:
         return hash(self._channels)
 
     def __repr__(self) -> str:
-        """Show the names."""
+        """Show the channel names."""
         return f"ChannelTable({', '.join(self._index)})"
 
 

@@ -119,7 +119,7 @@ _BLOCKS_IN_FLIGHT = 1  # More blocks would be lost by a kill, and would fill mem
 
 
 class McapWriter:
-    """Stream of channel values and poses into an MCAP file, which is readable up to the last block at any moment.
+    """Stream of channel values and poses into an MCAP file, which is always readable up to the last block.
 
     `write` encodes in the calling thread. A thread of its own compresses and writes, because zstd and file output
     release the interpreter lock. The next `write` or `close` raises an error of that thread.
@@ -139,7 +139,7 @@ class McapWriter:
         *,
         overwrite: bool = True,
     ) -> None:
-        """Open the file and write everything that is known before the run.
+        """Open the file and write the data known before the run.
 
         Args:
             path: File to write.
@@ -298,7 +298,7 @@ class McapWriter:
         return self.path
 
     def close(self, metadata: Mapping[str, object] | None = None) -> None:
-        """Write what is known after the run, and end the file.
+        """Write the data known after the run, and end the file.
 
         A second call does nothing.
 
@@ -340,7 +340,7 @@ class McapWriter:
             )
 
     def __enter__(self) -> Self:
-        """Return the writer."""
+        """Return the open writer."""
         return self
 
     def __exit__(

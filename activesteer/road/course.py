@@ -28,7 +28,7 @@ class Lane(NamedTuple):
     left_y_m: float
 
     def outline_m(self) -> NDArray[np.float64]:
-        """Return its corners as a closed line: world x and y [m], shape (5, 2)."""
+        """Return the corners of the section as a closed line: world x and y [m], shape (5, 2)."""
         (start, end), (right, left) = self[1:3], self[3:]
         return np.array([(start, right), (end, right), (end, left), (start, left), (start, right)])
 
@@ -62,7 +62,7 @@ class Course:
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def on_lane_side(self) -> NDArray[np.bool_]:
-        """Return which cones stand on the side of a lane, shape (number of cones,)."""
+        """Return the mask of the cones at the sides of a lane, shape (number of cones,)."""
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
@@ -136,7 +136,7 @@ _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Dimensions of a car, with the widths of front and rear tyres, by default usual ones for drawing."""
+    """Dimensions of a car, by default usual ones for drawing, with the widths of front and rear tyres."""
 
     width_m: float = 1.8
     wheelbase_m: float = 2.7
@@ -175,7 +175,7 @@ _HIGHEST_M: Final = 1000.0
 
 @dataclass(frozen=True)
 class ProfileTable:
-    """Heights over the distance.
+    """Heights of the road over the distance.
 
     Keys of the table [road.heights], which a CSV of `road.profile` fills.
 
@@ -193,7 +193,7 @@ class ProfileTable:
     """Distance of the two tracks [m]."""
 
     def __post_init__(self) -> None:
-        """Check the points."""
+        """Check the points of the height profile."""
         tracks = {"left_z_m": self.left_z_m, "right_z_m": self.right_z_m}
         check_points("s_m", self.s_m, tracks, Range(2), ManeuverError)
         for key, values in tracks.items():
@@ -203,7 +203,7 @@ class ProfileTable:
             raise ManeuverError(f"is {self.s_m[-1] - self.s_m[0]:g} m long, at most {_MAX_LENGTH_M:g} m", key="s_m")
 
     def grid(self) -> Grid:
-        """Return the surface."""
+        """Return the grid of heights."""
         right = self.left_z_m if self.right_z_m is None else self.right_z_m
         (step, right_z), (_, left_z) = (sampled(self.s_m, track, STEP_M) for track in (right, self.left_z_m))
         return Grid(self.s_m[0], step, -0.5 * self.track_m, self.track_m, np.column_stack([right_z, left_z]))

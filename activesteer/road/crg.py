@@ -90,7 +90,7 @@ def referenced(content: bytes) -> str | None:
 
 
 def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
-    """Read a surface."""
+    """Read the surface of an OpenCRG file."""
     blocks, data = _split(content_of(name))
     mods = blocks.get("ROAD_CRG_MODS")
     for _ in range(limits.MAX_CRG_FILES):

@@ -1,4 +1,4 @@
-"""Surface of an uneven road as a recording keeps it, to be drawn: heights at places along and across the road."""
+"""Surface of an uneven road as a recording keeps it for drawing: heights along and across the road."""
 
 from __future__ import annotations
 

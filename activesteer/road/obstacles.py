@@ -48,7 +48,7 @@ class Grid(NamedTuple):
         return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
 
     def knows(self, s_m: Array, d_m: Array) -> NDArray[np.bool_]:
-        """Return for each place whether it is within the grid."""
+        """Return the mask of the places within the grid."""
         along, across = (s_m - self.s_m) / self.step_s_m, (d_m - self.d_m) / self.step_d_m
         rows, columns = self.z_m.shape
         return (along >= 0.0) & (along <= rows - 1) & (across >= 0.0) & (across <= columns - 1)
@@ -119,7 +119,7 @@ class Obstacle:
     """Number of waves of a `sine_wave`, or 0 for no end."""
 
     def __post_init__(self) -> None:
-        """Check that the obstacle has what its kind needs, and nothing without effect."""
+        """Check that all keys of the obstacle's kind are given and that no key is without effect."""
         ramp = self.kind == "cross_slope_ramp"
         for key, needed in (
             ("length_m", self.kind != "kerb"), ("height_m", not ramp), ("slope", ramp)
@@ -200,12 +200,12 @@ class Roughness:
     """Highest spatial frequency [cycles/m]; the tyre swallows shorter waves."""
 
     def __post_init__(self) -> None:
-        """Check the band."""
+        """Check that the band of spatial frequencies is not empty."""
         if not max(self.least_1pm, 1.0 / self.length_m) < self.greatest_1pm:
             raise ManeuverError(f"is {self.greatest_1pm:g}, not above least_1pm and 1/length_m", key="greatest_1pm")
 
     def grid(self) -> Grid:
-        """Return the surface."""
+        """Return the grid of heights."""
         return _grid(self)
 
 

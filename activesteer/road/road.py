@@ -56,7 +56,7 @@ class RoadPatch:
     """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
 
     def __post_init__(self) -> None:
-        """Check the place."""
+        """Check that the patch ends behind its start."""
         if not self.end_m > self.start_m:
             raise ManeuverError(
                 f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
@@ -73,7 +73,7 @@ class BankingTable:
     """Bank at these places [rad]. Positive if the left side is higher."""
 
     def __post_init__(self) -> None:
-        """Check the points."""
+        """Check the points of the banking."""
         check_points("s_m", self.s_m, {"bank_deg": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
@@ -101,7 +101,7 @@ class Area(NamedTuple):
     slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """Return its part within a rectangle [m], or None if they do not overlap."""
+        """Return the part of this rectangle within another one [m], or None if they do not overlap."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         if not (start < end and right < left):
@@ -202,7 +202,7 @@ class Road:
 
     @property
     def contact_used(self) -> str:
-        """Way of contact on the uneven surface."""
+        """Type of contact on the uneven surface."""
         if self.contact != "auto":
             return self.contact
         smooth = not (self._is_gridded or self.is_steep)

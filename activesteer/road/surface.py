@@ -235,7 +235,7 @@ _REACH_M: Final = 0.4
 
 
 class Surface(NamedTuple):
-    """An uneven road for the kernels: head, shape (1,), its numbers, and obstacles in the order of their starts."""
+    """An uneven road for the kernels: head, shape (1,), numbers, and obstacles in the order of their starts."""
 
     head: NDArray[Any]
     numbers: Array

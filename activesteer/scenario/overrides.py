@@ -16,7 +16,7 @@ from activesteer.plugins import Plugin
 
 
 class Override(NamedTuple):
-    """One replaced key."""
+    """One replaced key, with its path and value."""
 
     given: str
     path: tuple[str, ...]

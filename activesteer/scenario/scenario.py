@@ -265,7 +265,7 @@ def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
 
 
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
-    """Return the value of a key of the manoeuvre, the vehicle or the driver, a number in the unit of the key.
+    """Return the value of a key of the manoeuvre, the vehicle or the driver, in the unit of the key.
 
     Keys and controllers are those of `resolve`.
     """
@@ -355,7 +355,7 @@ def _cannot(key: str, reason: str) -> ParameterError:
 
 
 def _with(cls: type[Any], table: Mapping[str, Any], path: list[str], value: Any, above: list[str]) -> Any:
-    """Build a dataclass from a table with one key replaced."""
+    """Build a dataclass from a table in which one key is replaced."""
     source = Source("", error=ParameterError, overridden=frozenset({".".join((*above, *path))}))
     return build(cls, merged(cls, table, path, value, source, above), source, above)
 

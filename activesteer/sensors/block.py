@@ -180,7 +180,7 @@ class SensorBlock:
         self.outputs[:] = [number for part in parts for number in part]
 
     def measurement(self, time_s: float) -> Measurement:
-        """Return the current readings."""
+        """Return the current readings as a `Measurement`."""
         values = iter(self.outputs.tolist())
         parts = (next(values) if width == 1 else tuple(islice(values, width)) for width in widths_of(Measurement)[1:])
         return Measurement._make((time_s, *parts))

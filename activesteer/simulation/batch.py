@@ -158,7 +158,7 @@ class Batch(Copyable):
         self._ratios = np.array([loop.driver_setup.steering_ratio for loop in self.loops])
 
     def __len__(self) -> int:
-        """Number of cars."""
+        """Return the number of cars."""
         return len(self.scenarios)
 
     @property
@@ -299,7 +299,7 @@ class Batch(Copyable):
                     self.loops[car].change(key, values[car])
 
     def fail(self, fault: str | Fault, cars: ArrayLike | None = None) -> None:
-        """Set a fault in some cars, in addition to those that act already (see `Simulation.fail`).
+        """Set a fault in some cars, in addition to the active faults (see `Simulation.fail`).
 
         Args:
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.

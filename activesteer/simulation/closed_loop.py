@@ -1,4 +1,4 @@
-"""The closed loop of one car: its blocks, its record, what Python does where `native_loop` stops, and changes.
+"""Closed loop of one car: its blocks, its record, the work of Python between native steps, and changes.
 
 While a car is driven, the state of native blocks and of the controller's bus is in its record.
 """
@@ -69,7 +69,7 @@ class NonReentrantLock:
         self._lock = threading.Lock()
 
     def __enter__(self) -> None:
-        """Enter, or raise an error while another caller is inside."""
+        """Enter the context, or raise an error if another caller is inside."""
         if not self._lock.acquire(False):
             raise ManeuverError(
                 "this simulation is already being driven, by another thread or by the caller of its own block; use a "
@@ -77,7 +77,7 @@ class NonReentrantLock:
             )
 
     def __exit__(self, *_: object) -> None:
-        """Leave."""
+        """Release the lock."""
         self._lock.release()
 
 
@@ -239,7 +239,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def maneuver(self) -> Maneuver:
-        """Source of the setpoints."""
+        """Manoeuvre that gives the setpoints."""
         return self._maneuver
 
     @maneuver.setter
@@ -307,7 +307,7 @@ class ClosedLoop(Uncopyable):
         self._store()
 
     def add_fault(self, fault: str | Fault) -> str:
-        """Set a fault, in addition to those that act already, and return it in words (see `Simulation.fail`)."""
+        """Set a fault in addition to the active faults, and return it in words (see `Simulation.fail`)."""
         now_s = self.step_count * self.vehicle.timestep_s
         given = fault_from(fault, now_s)
         self.fail([given], more=True)
@@ -331,7 +331,7 @@ class ClosedLoop(Uncopyable):
         self.changes = (*self.changes, (key, value, time_s))
 
     def _new_block(self, part: str, scenario: Scenario) -> Any:
-        """Create the driver or the controller of a scenario, and note what it may know."""
+        """Create the driver or the controller of a scenario, and record the properties that it may know."""
         if part == "controller":
             self.controller_setup, _, block = control_unit(self._plugin, scenario, self.vehicle)
             return block
@@ -549,7 +549,7 @@ class ClosedLoop(Uncopyable):
         self._stage[0] = native.CONTROL
 
     def _ask_controller(self) -> None:
-        """Call a controller in Python, and hold its decision."""
+        """Call a controller in Python, and hold its command."""
         controller = self.blocks[1]
         told = self._driver_numbers.item(0) if self._ratio.item(0) == 0.0 else self._seen.tolist()
         driver_command = self._driver_command(told)
@@ -579,7 +579,7 @@ _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
 
 
 def _arrived(bus: Array, calls: Any) -> Array:
-    """Return the decision that arrives from a bus after some calls."""
+    """Return the command that arrives from a bus after some calls."""
     return bus[int(calls[0]) % len(bus)]
 
 

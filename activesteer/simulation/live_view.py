@@ -38,7 +38,7 @@ _TURN_S: Final = 0.4
 
 
 class FramePacer:
-    """Keeper of simulated time to the time of a clock.
+    """Pacer that keeps simulated time in step with a clock.
 
     Attributes:
         speed: Simulated seconds per second of the clock.
@@ -246,7 +246,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the thread of the viewer at the end, because the shutdown of Python otherwise crashes."""
+    """Wait for the viewer's thread at the end, because otherwise the shutdown of Python crashes."""
     before = set(threading.enumerate())
     try:
         yield

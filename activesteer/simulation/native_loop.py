@@ -98,7 +98,7 @@ def _begin(car, bindings):
 
 @inlined
 def _drive(car):
-    """Find the setpoint, let the driver act, and return a status."""
+    """Find the setpoint, call the driver, and return a status."""
     if car.driver_given != 0:
         return DONE
     if car.driver_kind == PYTHON:
@@ -127,7 +127,7 @@ def _drive(car):
 
 @inlined
 def _control(car):
-    """Let the controller decide if it is its turn, and return a status."""
+    """Let the controller compute a command if it is due, and return a status."""
     if car.controller_given != 0 or car.calls % car.every != 0:
         return DONE
     seen = car.driver_command
@@ -145,7 +145,7 @@ def _control(car):
 
 @inlined
 def _pass_on(car):
-    """Put the held decision on the bus, and take the arriving one."""
+    """Put the held command on the bus, and take the arriving one."""
     length, bus = car.on_bus + 1, array_of(car.bus)
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):

@@ -48,7 +48,7 @@ class RealtimePacer:
         self._steps += 1
 
     def report(self) -> dict[str, Any]:
-        """Return what the recording keeps: missed deadlines, and how late the steps began [s]."""
+        """Return the values for the recording: missed deadlines, and the delay of the steps [s]."""
         late_s = self._late_s[: self._steps]
         p50, p99, most = (float(np.quantile(late_s, q)) for q in (0.5, 0.99, 1.0)) if self._steps else (0.0,) * 3
         return {

@@ -1,4 +1,4 @@
-"""From a scenario to one that can be driven: a car that settles, the search for a steering amplitude, its store.
+"""Preparation of a scenario: a settled car, the search for a steering amplitude, and the store of amplitudes.
 
 A found amplitude is the input for every controller. It is kept under a key of everything that it depends on, in the
 process and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete
@@ -56,7 +56,7 @@ _writes = True
 
 
 def folder() -> Path:
-    """Return the folder of the numbers, which need not exist."""
+    """Return the folder of the stored amplitudes, which may not exist."""
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # XDG base directory specification: ignore a path that is not absolute.
     cache = given if given.is_absolute() else Path.home() / ".cache"
@@ -64,7 +64,7 @@ def folder() -> Path:
 
 
 def recall(key: str) -> float | None:
-    """Return a stored number, bit-identical, or None if there is none."""
+    """Return a stored amplitude, bit-identical, or None if there is none."""
     if key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
@@ -75,7 +75,7 @@ def recall(key: str) -> float | None:
 
 
 def keep(key: str, value: float) -> None:
-    """Store a number."""
+    """Store an amplitude in the process and, if allowed, on disk."""
     _remember(key, value)
     if not _writes:
         return
@@ -98,7 +98,7 @@ def keep(key: str, value: float) -> None:
 
 @contextlib.contextmanager
 def not_on_disk() -> Iterator[None]:
-    """Keep numbers found inside in the process only, because the many cars of a study do not occur again."""
+    """Keep amplitudes found in this context only in the process, because the cars of a study do not recur."""
     global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
     before, _writes = _writes, False
     try:

@@ -1,4 +1,4 @@
-"""The recorder of a run: rows of channels block by block, and what else is needed to repeat and draw the run."""
+"""Recorder of a run: rows of channels block by block, and the data that repeat and draw the run."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def run_scenario(
     realtime: bool | float = False,
     link: Link | None = None,
 ) -> Recording:
-    """Run a scenario.
+    """Run a scenario, and record it to a file if a path is given.
 
     If a path is given, write the recording during the run.
 

@@ -53,14 +53,14 @@ class Link(Protocol):
         """Receive the function that checks and completes commands, with errors that name the source of a command."""
 
     def commands(self) -> Given:
-        """Return the commands for the next step, or None where the run's own block decides."""
+        """Return the commands for the next step, with None where the run's own block decides."""
         ...
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
         """Send the state after a step."""
 
     def close(self) -> None:
-        """End the link."""
+        """Close the link to the other process."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class SavedState:
 
 
 class Simulation(Copyable):
-    """`simulate`, step by step.
+    """A run of the car that you drive step by step.
 
     `copy()`, `copy.deepcopy` and `pickle` return an independent simulation that continues bit-identically. One thread
     at a time can drive a simulation.
@@ -295,7 +295,7 @@ class Simulation(Copyable):
             self._note("set", f"{key} = {json.dumps(value, default=str)}")
 
     def fail(self, fault: str | Fault) -> None:
-        """Set a fault, in addition to those that act already.
+        """Set a fault, in addition to the active faults.
 
         The recording keeps it as an event.
 
@@ -327,7 +327,7 @@ class Simulation(Copyable):
             self._writer.write_events(self.events[-1:])
 
     def _note_phases(self) -> None:
-        """Note the phases that have begun since the last call."""
+        """Record the phases that have begun since the last call."""
         known = sum(event.kind == "phase" for event in self.events)
         for time_s, name in self.loop.sequence.began[known:] if self.loop.sequence is not None else ():
             self._note("phase", name, time_s)
@@ -438,7 +438,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Write a file while the context lasts and the run proceeds.
+        """Write a file while the context is active and the run proceeds.
 
         Enter the context before the first step.
 
@@ -467,7 +467,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Note a failure, after which the states of the blocks do not match, and keep the recorded rows."""
+        """Record a failure, after which the states of the blocks do not match, and keep the recorded rows."""
         try:
             yield
         except BaseException as failure:

@@ -42,7 +42,7 @@ without any result the function raises `NoResult`."""
 
 @dataclass(frozen=True)
 class Examination:
-    """Result of a test."""
+    """Result of a test by a standard."""
 
     standard: Standard
     vehicle: str
@@ -58,7 +58,7 @@ class Examination:
         return [name for name, found in self.findings.items() if found.passed is False or found.error]
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values."""
+        """Return the result as JSON values."""
         return {
             "standard": self.standard.name,
             "edition": self.standard.edition,
@@ -121,7 +121,7 @@ _PALE: Final = 0.55
 
 
 def examination_page(result: Examination) -> Page:
-    """Return the page."""
+    """Return the page of a test."""
     standard = result.standard
     car = Markup("Vehicle <b>{}</b>, driver {}").format(result.vehicle, result.driver)
     for key, value in result.overrides.items():

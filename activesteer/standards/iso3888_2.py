@@ -119,7 +119,7 @@ def _room(run: StandardRun) -> str:
 def _pictures(
     runner: StandardRunner, speeds: dict[str, float | None], driven: dict[str, list[StandardRun]]
 ) -> list[Picture]:
-    """Return pictures of the best run to each side: its track between the cones, and its channels over time."""
+    """Return figures of the best run to each side: its track between the cones, and its channels over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []

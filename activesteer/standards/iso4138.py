@@ -126,6 +126,6 @@ def _picture(method: str, runs: dict[str, StandardRun]) -> Picture:
 
 
 def _smooth(values: Array) -> Array:
-    """Return the mean over half a second, for the picture."""
+    """Return the mean over half a second, for the figure."""
     width = 25
     return np.convolve(values, np.full(width, 1.0 / width), mode="valid") if len(values) > width else values

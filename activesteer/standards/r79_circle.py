@@ -63,7 +63,7 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Time from the start of steer to a radius, and greatest force at the rim until then, or nan if not reached."""
+    """Time from the start of steer to a radius, and largest force at the rim until then, or nan if not reached."""
 
     time_s: float
     effort_N: float
@@ -433,7 +433,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the time by bisection, below the time when the lasting fault exceeds a limit.
+    """Find the longest duration of a fault that keeps the limits, by bisection below `broken_s` [s].
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """

@@ -48,7 +48,7 @@ class StandardRun:
 
     @property
     def metadata(self) -> Mapping[str, Any]:
-        """Empty: the test runner knows the car."""
+        """Empty metadata, because the test runner knows the car."""
         return {}
 
     def __getitem__(self, channel: str) -> Array:
@@ -64,7 +64,7 @@ class StandardRun:
 
     @property
     def values(self) -> dict[str, Any]:
-        """Case and metrics, or the reason for no metrics, as JSON values."""
+        """Return case and metrics as JSON values, or the reason why there are no metrics."""
         return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:

@@ -259,7 +259,7 @@ def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
 
 
 def _memory_MB() -> float:
-    """Return the memory that this process holds [MB], or 0 where the system does not tell."""
+    """Return the memory that this process holds [MB], or 0 where the system does not report it."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

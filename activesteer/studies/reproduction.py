@@ -39,7 +39,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass
 class Reproduction:
-    """Result of a reproduction."""
+    """Result of a reproduction: recordings, failures and scorecard."""
 
     paths: dict[str, dict[str, Path]] = field(default_factory=dict)  # scenario -> system -> MCAP file
     # (scenario, system) -> reason why that run ended early; its file holds the rows up to then
@@ -103,7 +103,7 @@ def reproduce(
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[tuple[str, str, str]]:
-    """Drive all runs.
+    """Drive all runs, and report each of them when it ends.
 
     Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
 

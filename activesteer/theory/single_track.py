@@ -59,7 +59,7 @@ class SingleTrackParameters:
     the identified parameters replace them. `identified`: they are the result of such a drive."""
 
     def __post_init__(self) -> None:
-        """Check the source."""
+        """Check the source of the parameters."""
         if self.source not in SOURCES:
             raise ParameterError(
                 f"is {self.source!r}; allowed are {', '.join(SOURCES)}", key="source", value=self.source

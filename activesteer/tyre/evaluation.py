@@ -24,7 +24,7 @@ _MF52 = 52
 
 
 class _Column:
-    """A column of a table of `TyreForces`, by the name of the attribute, in the shape of the inputs."""
+    """Descriptor of a column of `TyreForces`, by the name of the attribute, in the shape of the inputs."""
 
     def __init__(self, table: str, columns: tuple[str, ...]) -> None:
         self._table, self._columns = table, columns
@@ -99,7 +99,7 @@ class TyreForces:
 
     @cached_property
     def _rolling(self) -> Values:
-        """Columns of ROLLING_COLUMNS."""
+        """Values of `ROLLING_COLUMNS` for all inputs."""
         rolling = np.empty((len(self._inputs), len(ROLLING_COLUMNS)))
         rolling_rows(self._tyre, self._inputs, self._forces, rolling)
         return rolling

@@ -276,7 +276,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
 
 
 def _combined_slip(formula: MagicFormula) -> Picture:
-    """Forces versus slip for slip angles, and forces against each other."""
+    """Forces versus slip for several slip angles, and lateral versus longitudinal force."""
     params = formula.parameters
     nominal, kappa = _nominal(params), _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]

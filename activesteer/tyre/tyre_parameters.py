@@ -1,4 +1,4 @@
-"""Parameters of a tyre, its conventions, and whether its forces are finite over its ranges.
+"""Parameters of a tyre and its conventions, and a check that its forces are finite over its ranges.
 
 A .tir file holds coefficients, not a program. The defaults are the conventions of this package. The alternatives are
 those of other codes, so that a car can be compared with one of theirs, force by force.
@@ -215,7 +215,7 @@ class TyreParameters(Mapping[str, float]):
     conventions: TyreConventions = TyreConventions()
 
     def __post_init__(self) -> None:
-        """Check the values and derive what the file leaves open."""
+        """Check the values and derive those that the file does not give."""
         source = str(self.source or "tyre")
         values = _resolve(self.given, source)
         object.__setattr__(self, "_values", MappingProxyType(values))
@@ -289,7 +289,7 @@ class TyreParameters(Mapping[str, float]):
         return iter(BY_NAME)
 
     def __len__(self) -> int:
-        """Number of keys."""
+        """Return the number of keys."""
         return len(BY_NAME)
 
     def __contains__(self, key: object) -> bool:

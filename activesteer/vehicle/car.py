@@ -262,7 +262,7 @@ class Vehicle(Uncopyable):
 
     @property
     def gear(self) -> float:
-        """Current gear."""
+        """Gear that the car is in."""
         return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
@@ -287,7 +287,7 @@ class Vehicle(Uncopyable):
         native_step.replay(self._address, inputs)
 
     def follow_model(self) -> None:
-        """Take over changes of `model` that a plan of the step froze (see `ImplicitPlan.follow`)."""
+        """Apply changes of `model` that a plan of the step froze (see `ImplicitPlan.follow`)."""
         self._implicit.follow()
 
     @property
@@ -383,7 +383,7 @@ class Vehicle(Uncopyable):
         return np.concatenate((state, *self._memory(), (self.gear,)))
 
     def restore_state(self, state: NDArray[np.float64]) -> None:
-        """Restore a saved state.
+        """Restore a state that `save_state` has returned.
 
         Raises:
             ParameterError: `state` is not a state of this car.
@@ -441,7 +441,7 @@ class Vehicle(Uncopyable):
                     raise ParameterError(f"belongs to another car: {name} has another size", key="model")
 
     def change_road(self, road: Road) -> None:
-        """Drive on with other frictions of the same number of areas."""
+        """Apply the frictions of a road with the same number of areas."""
         fb.section_of(self.model, "wheels")["mu"] = road.mu
         areas = fb.section_of(self.model, "areas")
         assert len(areas) == len(road.areas())

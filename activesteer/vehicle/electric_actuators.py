@@ -295,7 +295,7 @@ class ElectricActuator:
     """Speed loop: rate at which a speed error decays, if the motor is strong enough [1/s]."""
 
     def __post_init__(self) -> None:
-        """Refuse a key without effect."""
+        """Reject a key without effect."""
         for item in fields(self):
             if not self.has_motor and item.name != "preset" and (value := getattr(self, item.name)) is not None:
                 problem = f"has no effect on the {self.MODEL}, whose numbers are in the model"
@@ -313,7 +313,7 @@ class ElectricActuator:
         return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
 
     def smooth(self) -> Self:
-        """Return the actuator without play, dry friction and position tolerance, within which slopes mean nothing."""
+        """Return the actuator without play, dry friction and position tolerance, which make slopes meaningless."""
         loose = [item.name for item in fields(self) if item.name.startswith(_LOOSE)]
         return replace(self, **dict.fromkeys(loose, 0.0)) if self.has_motor else self
 
@@ -323,7 +323,7 @@ class ElectricActuator:
         return known(self.supply_voltage_V) / known(self.nominal_voltage_V)
 
     def motor_numbers(self) -> dict[str, float]:
-        """Fields of a `SCREW` record that follow from these."""
+        """Derived fields of a `SCREW` record."""
         ratio = self.voltage_ratio
         return {
             "inertia_kgm2": known(self.rotor_inertia_kgm2),

@@ -88,7 +88,7 @@ class Faults:
         return [acting.memory.copy() for acting in self._acting]
 
     def restore_state(self, state: list[Array]) -> None:
-        """Restore a saved state."""
+        """Restore saved memory of the faults."""
         for acting, memory in zip(self._acting, state, strict=True):
             acting.memory[:] = memory
 
@@ -194,7 +194,7 @@ class _ActuatorFault(_DemandFault):
         )  # fmt: skip
 
     def engage(self) -> None:
-        """Activate the fault."""
+        """Activate the fault of the actuator in the model."""
         held = 0.0
         if self._kind == native.STUCK:
             if not self.memory[0]:
@@ -227,7 +227,7 @@ class _MotorFault(_DemandFault):
         self._demand = vehicle.electric.states[number : number + 1]["demand_Nm"]
 
     def engage(self) -> None:
-        """Activate the fault."""
+        """Activate the fault of the motor."""
         record, kind = self._record, self.fault.kind
         if kind == "stuck":
             record["stuck"] = 1.0

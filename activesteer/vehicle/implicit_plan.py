@@ -1,4 +1,4 @@
-"""The plan of the implicit solution, and looking for changes in the engine's memory.
+"""Plan of the implicit solution, and detection of changes in the engine's memory.
 
 All features of MuJoCo 4.0's models, and who computes a step that has them. "Engine" is the engine's own `mj_step`.
 
@@ -66,7 +66,7 @@ _bytes: Final = pointer_to(types.uint8)
 
 @compiled_call(types.intp, types.intp, types.intp, types.intp, types.intp, others_run=False)
 def watch(copies, n_copies, positive, n_positive):
-    """Compare arrays with their copies, and look for negative numbers."""
+    """Compare arrays with their copies, and check for negative numbers."""
     changed = negative = False
     rows = word_pointer(copies)
     for index in range(n_copies):
@@ -300,7 +300,7 @@ _options: Final = operator.attrgetter(*OPTIONS)
 
 
 def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Discard what the engine prepared for its own solution and would otherwise partly renew in every step."""
+    """Discard the data that the engine prepared for its own solution and would partly renew in every step."""
     integrator = model.opt.integrator
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
     mujoco.mj_fwdPosition(model, data)

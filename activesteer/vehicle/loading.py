@@ -36,7 +36,7 @@ _TANK_M: Final = (0.4, 0.0, 0.35)
 
 
 def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Load the car.
+    """Add the masses of a load to the car.
 
     Masses are points fixed to the chassis. The site `cg`, whose motion is recorded, moves with the centre of gravity of
     the whole car. A car without load stays exactly as it is.
@@ -182,7 +182,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Add what MJCF lacks to drive, brakes, friction and servos, with forces by the activation at the end of a step."""
+    """Complete drive, brakes, friction and servos beyond MJCF, with forces by the activation at the end of a step."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER

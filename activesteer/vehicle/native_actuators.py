@@ -322,7 +322,7 @@ def _use_battery(motors, states, battery, given, qvel, spins):
 def step_motors(
     motors_address, count, battery_address, states_address, ctrl, drives, qvel, spins, timestep_s, torques_set
 ):  # fmt: skip
-    """Make one step."""
+    """Advance the motors and the battery by one step."""
     motors = carray(_motor_pointer(motors_address), (count,))
     states = carray(_motor_state_pointer(states_address + _BATTERY_BYTES), (count,))
     for index in range(count):

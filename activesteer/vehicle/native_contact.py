@@ -1,4 +1,4 @@
-"""Contact of a wheel with an uneven road: the plane that the tyre feels.
+"""Contact of a wheel with an uneven road: the effective plane for the tyre.
 
 The tyre's formula needs a plane. Three ways lead to it, from the place straight below the lowest point of the wheel:
 
@@ -121,7 +121,7 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s,
 
 @compiled
 def _drop(cam, x):
-    """Return how far a cam is above its lowest point at a distance [m]."""
+    """Return the height of a cam above its lowest point at a distance [m]."""
     place = x / _CAM_STEP_M
     index = int(place)
     if index >= CAM_POINTS - 1:

@@ -32,7 +32,7 @@ _pointer: Final = pointer_to(from_dtype(FAULT))
 
 
 def memory_of(capacity: int) -> np.ndarray:
-    """Return an empty memory."""
+    """Return an empty memory for a number of values."""
     return np.zeros(2 + capacity)
 
 
@@ -208,5 +208,5 @@ CHANGE_FAULT: Final = (*(types.intp,) * 6, types.float64, types.float64, *(types
 
 @compiled_call(types.void, *SET_FAULT)
 def fault_of(part, block, gain, bias, healthy, kind, offset, held):
-    """Call `set_fault` from Python."""
+    """Call `set_fault` from Python, by addresses."""
     set_fault(part, block, gain, bias, healthy, kind, offset, held)

@@ -360,7 +360,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
 
 @compiled_callback(types.double)
 def _no_clock():
-    """Replace the clock that the engine reads some twenty times a step for statistics that nobody uses."""
+    """Replace the clock that the engine reads some twenty times per step for unused statistics."""
     return 0.0
 
 

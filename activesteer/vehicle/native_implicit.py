@@ -187,7 +187,7 @@ def _solve(plan):
 
 @inlined
 def _accelerate(plan):
-    """Find the accelerations that the sensors feel, gravity included, which the engine does not compute again."""
+    """Find the accelerations that the sensors feel, including gravity, which the engine does not compute again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return

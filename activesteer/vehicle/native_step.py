@@ -68,7 +68,7 @@ def _all_finite(address, size):
 
 @inlined
 def _sense(bindings, measurement_address, motion_address):
-    """Write the numbers of the true `Measurement` and of `Motion`, and return whether the state is sane."""
+    """Write the numbers of the true `Measurement` and `Motion`, and return whether the state is valid."""
     s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
     yaw_rate = carray(f64_pointer(bindings.qvel), (bindings.n_dofs,))[YAW_DOF]
     speed = s[bindings.velocimeter]

@@ -84,7 +84,7 @@ class DamperCurve:
     """Forces that resist these velocities [N]."""
 
     def __post_init__(self) -> None:
-        """Check the points."""
+        """Check that the curve has increasing velocities."""
         check_points("velocity_mps", self.velocity_mps, {"force_N": self.force_N}, Range(2, MAX_CURVE_POINTS))
 
 
@@ -149,7 +149,7 @@ class Powertrain:
 
 @dataclass(frozen=True)
 class Steering:
-    """The overall ratio of steering wheel and road wheels, for driver and controllers."""
+    """Overall ratio of steering wheel angle to road wheel angle, for driver and controllers."""
 
     ratio: Positive
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
@@ -162,7 +162,7 @@ class Steering:
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """Drag, without lift."""
+    """Aerodynamic drag, without lift."""
 
     drag_area_m2: NotNegative
     """Drag coefficient times frontal area [m2]."""
@@ -198,7 +198,7 @@ class Load:
     """Forward shift of it [m]."""
 
     def __post_init__(self) -> None:
-        """Check the positions."""
+        """Check that each position has three numbers."""
         for name in ("payload_position_m", "fuel_position_m"):
             position = getattr(self, name)
             if position is not None and len(position) != 3:
@@ -308,7 +308,7 @@ class VehicleParameters:
     """Factors; default 1."""
 
     def __post_init__(self) -> None:
-        """Refuse keys without effect."""
+        """Reject keys without effect."""
         if self.battery != Battery() and not list(self.motors):
             raise ParameterError("has no effect on a car without [motors]", key="battery")
         engine = self.powertrain
@@ -335,13 +335,13 @@ class VehicleParameters:
 
     @property
     def engine_share(self) -> float:
-        """Part of the driver's demand that the engine carries out and not the motors [-]."""
+        """Fraction of the driver's demand that the engine provides, not the motors [-]."""
         front = self.powertrain.front_fraction
         return 1.0 - sum(part for axle, part in (("front", front), ("rear", 1.0 - front)) if self.motors.on(axle))
 
     @property
     def drive(self) -> Powertrain:
-        """The powertrain as its driver knows it: with limits that the motors of each axle can carry out."""
+        """Powertrain in the form that its driver knows, with limits that the motors of each axle can deliver."""
         engine, (front, _, rear, _) = self.powertrain, self.powertrain.wheel_fractions
         torques_Nm, powers_W = [engine.max_torque_Nm], [engine.max_power_W]
         for axle, fraction in (("front", 2.0 * front), ("rear", 2.0 * rear)):
@@ -383,7 +383,7 @@ def drive_limits(
     types.UniTuple(types.float64, 2), types.float64, types.intp, types.UniTuple(types.float64, 4), others_run=False
 )
 def _limits_Nm(speed_radps, gear, numbers):
-    """`drive_limits`, called from Python."""
+    """Law of `drive_limits`, called from Python."""
     return drive_limits(speed_radps, gear, *numbers)
 
 
@@ -395,7 +395,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
 
 
 class PowertrainLimits:
-    """The drive as its driver knows it: its torque limits at the current speed of the wheels.
+    """Drive in the form that its driver knows: torque limits at the current speed of the wheels.
 
     Attributes:
         fractions: Fraction of the torque that each wheel gets.

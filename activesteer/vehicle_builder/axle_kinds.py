@@ -37,7 +37,7 @@ class LinkKind:
 
 @dataclass(frozen=True)
 class AxleKind:
-    """One kind of suspension."""
+    """A kind of suspension, with its links and points."""
 
     name: str
     axles: Sequence[str]  # that can have it
@@ -49,12 +49,12 @@ class AxleKind:
 
     @property
     def strut(self) -> bool:
-        """The knuckle slides on a strut."""
+        """True if the knuckle slides on a strut."""
         return self.spring_on == "strut"
 
     @property
     def guided(self) -> bool:
-        """Curves guide the wheel."""
+        """True if curves guide the wheel."""
         return self.spring_on == "travel"
 
     @property

@@ -45,7 +45,7 @@ def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
 
 @dataclass(frozen=True)
 class NewVehicle:
-    """A new car.
+    """A new car: its files, and the values that were assumed or adjusted.
 
     Attributes:
         folder: Folder of its files.

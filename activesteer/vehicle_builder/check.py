@@ -58,7 +58,7 @@ class Finding:
 
 
 def checked(topic: str, what: str, good: bool, value: str, advice: str) -> Finding:
-    """Return the finding about a property that a car must have, with the advice if it has not."""
+    """Return the finding about a property that a car must have, with advice if it is missing."""
     return Finding(topic, what, "ok" if good else "error", value, "", "" if good else advice)
 
 
@@ -202,7 +202,7 @@ def _metrics(result: KcResult, topic: str) -> Iterator[Finding]:
 
 
 def _sign(result: KcResult) -> Finding:
-    """Check that a left turn of the steering wheel turns both wheels to the left."""
+    """Check that turning the steering wheel to the left turns both wheels to the left."""
     sweep = result.curves["steering_rolling"]
     turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
     good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0

@@ -1,4 +1,4 @@
-"""From the table of a car to its design: what the table leaves open follows from published proportions.
+"""Completion of a car: values that its table leaves open follow from published proportions.
 
 The engine's step is implicit in the stiffness of tendons, so the bushings are tendons along the slides, like all other
 springs of a car.

@@ -1,4 +1,4 @@
-"""A complete car: values of the table, and values by rules, which are kept."""
+"""A complete car: values from its table, and assumed values, which are logged."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from activesteer.vehicle_builder.table import AxleTable, CarTable
 
 @dataclass(frozen=True)
 class Assumption:
-    """A value that the table does not give."""
+    """An assumption: a value that the table does not give."""
 
     key: str
     value: str
@@ -87,7 +87,7 @@ class Axle:
 
     @property
     def wheel_centre_m(self) -> Array:
-        """Left wheel centre."""
+        """Position of the left wheel centre."""
         return self.points["wheel_centre"]
 
     @property
@@ -120,12 +120,12 @@ class CarDesign:
 
     @property
     def axles(self) -> tuple[Axle, Axle]:
-        """Front and rear axle."""
+        """The front and the rear axle."""
         return self.front, self.rear
 
     @property
     def questions(self) -> tuple[str, ...]:
-        """Unusual measurements."""
+        """Questions about unusual measurements."""
         return tuple(line for axle in self.axles if axle.measured is not None for line in axle.measured.questions)
 
     @property
@@ -135,26 +135,26 @@ class CarDesign:
 
 
 class Log:
-    """Log of the assumptions."""
+    """Collector of the assumptions."""
 
     def __init__(self) -> None:
         self.assumptions: list[Assumption] = []
 
     def take(self, path: str, part: Any, name: str, default: float, rule: str) -> float:
-        """Return a value of a part of the table, or the default, which is then noted."""
+        """Return a value of a part of the table, or the default, which is logged as an assumption."""
         if (given := getattr(part, name)) is not None:
             return given
         self.note(f"{path}.{name}" if path else name, f"{default:.4g} {unit_of(name)}".strip(), rule)
         return default
 
     def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:
-        """Return the given angle, or the default in degrees, which is then noted [rad]."""
+        """Return the given angle, or the default in degrees, which is logged as an assumption [rad]."""
         if given_rad is None:
             self.note(key, f"{default_deg:g} deg", rule)
         return math.radians(default_deg) if given_rad is None else given_rad
 
     def note(self, key: str, value: str, rule: str) -> None:
-        """Note an assumption."""
+        """Add an assumption to the log."""
         self.assumptions.append(Assumption(key, value, rule))
 
 

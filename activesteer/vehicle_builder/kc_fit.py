@@ -1,4 +1,4 @@
-"""From samples of a K&C rig to the curves and the compliance of an axle.
+"""Fit of the curves and the compliance of an axle to samples of a K&C rig.
 
 Directions without a load in the tests get the compliance of the compact (a weak pull towards it). The stiffness is
 symmetric and positive definite, because the search is for a product of triangles.

@@ -1,4 +1,4 @@
-"""A folder of K&C tables of a laboratory: files, units, names and signs become samples of the left wheel.
+"""Reader of a laboratory's K&C tables, which become samples of the left wheel.
 
 Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.result.TESTS` names the tests). The
 samples of the right wheel are mirrored and added to those of the left wheel. Both branches of a loop are kept, and the
@@ -52,7 +52,7 @@ _GREATEST_WAY_M: Final = 10.0
 
 @dataclass(frozen=True)
 class Samples:
-    """One test for the left wheel, SI units."""
+    """One test for the left wheel, in SI units."""
 
     x: Array  # travel, rack to the left, force forwards or to the left, moment to the left; shape (n,)
     channels: dict[str, Array]  # channel to samples, shape (n,)
@@ -96,7 +96,7 @@ class KcTables:
 
 
 def read_kc(folder: Path, axles: list[str]) -> KcTables:
-    """Read the tests of a folder."""
+    """Read the K&C tests of a folder."""
     if not is_folder(folder):
         raise ParameterError(f"there is no folder {folder}")
     names = _translation(folder)
@@ -129,7 +129,7 @@ def _check_files(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Names:
-    """Tables of names.toml."""
+    """Tables of the file names.toml of a folder."""
 
     names: dict[str, str] = field(default_factory=dict)
     signs: dict[str, float] = field(default_factory=dict)
@@ -232,7 +232,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
 
 
 def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:
-    """Return the rack travel per steering wheel angle, without a rack in the file 7.5 mm/rad by definition."""
+    """Return the rack travel per steering wheel angle, by definition 7.5 mm/rad if the file has no rack."""
     if "steering_wheel" not in columns:
         if "rack" not in columns:
             raise ParameterError("neither rack nor steering_wheel was measured", file=file.name)

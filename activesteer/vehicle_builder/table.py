@@ -163,7 +163,7 @@ class MassTable:
 
 @dataclass(frozen=True)
 class SteeringTable:
-    """Rack and column."""
+    """Keys of the steering: rack and column."""
 
     ratio: Annotated[float, Range(1.0, 60.0)] | None = None
     """Steering wheel angle over mean road-wheel angle at the centre, unloaded."""

@@ -59,7 +59,7 @@ class TrimmedAxle:
 
 @dataclass
 class Trimmed:
-    """Result of the trim."""
+    """Values that the trim has found."""
 
     front: TrimmedAxle = field(default_factory=TrimmedAxle)
     rear: TrimmedAxle = field(default_factory=TrimmedAxle)

@@ -67,7 +67,7 @@ def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: fl
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a film."""
+    """Settings of a film, such as camera, size and frame rate."""
 
     camera: str = "chase"
     """`chase`, `top` or `wheel`."""
@@ -87,7 +87,7 @@ class Settings:
     """Whether the shells of the cars are transparent. The camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
-        """Check the settings."""
+        """Check that the settings can be drawn."""
         for kind, name, names in (
             ("camera", self.camera, tuple(_SHELL_OPACITY)),
             ("corner", self.corner, CORNERS),
@@ -105,7 +105,7 @@ class Settings:
 
 
 class Film:
-    """Scenes and cameras for some recordings, as the context of a `with` block."""
+    """Scenes and cameras for some recordings, a context for a `with` block."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
         """Build the scenes."""
@@ -134,12 +134,12 @@ class Film:
         self._canvases: list[Offscreen] = []
 
     def __enter__(self) -> Self:
-        """Open the canvases."""
+        """Open the canvases of all panes."""
         self._canvases = [Offscreen(pane.scene.model, pane.size) for pane in self._panes]
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close the canvases."""
+        """Close the canvases of all panes."""
         for canvas in self._canvases:
             canvas.close()
 

@@ -56,7 +56,7 @@ class Dials(NamedTuple):
         return self.value("speed_mps", time_s) > SLOWEST_MPS
 
     def has(self, line: Line) -> bool:
-        """Return whether the run has a line: an angle that no controller demands is left out."""
+        """Return whether the run has a value for the line. An angle that no controller demands is left out."""
         return line.channel in self.recording and line.of(self.recording) is not None
 
 

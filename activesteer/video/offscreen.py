@@ -72,7 +72,7 @@ def _problem_with(name: str) -> str | None:
 
 
 class Offscreen:
-    """An offscreen canvas."""
+    """A canvas for offscreen rendering."""
 
     def __init__(self, model: mujoco.MjModel, size: tuple[int, int]) -> None:
         """Open the canvas."""
@@ -117,7 +117,7 @@ class Offscreen:
         return self._pixels[::-1]
 
     def close(self) -> None:
-        """Free the graphics memory."""
+        """Free the graphics memory of the canvas."""
         self._context.make_current()
         self._drawer.free()
         self._context.free()

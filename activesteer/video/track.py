@@ -101,7 +101,7 @@ class Track:
         return self._time_s, self._middles_m
 
     def wheel_centre(self, corner: str, time_s: float) -> Array:
-        """Return where the centre of a wheel is at a time [m], if it does not move relative to the chassis."""
+        """Return the centre of a wheel at a time [m], if the wheel does not move relative to the chassis."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(
@@ -117,7 +117,7 @@ def _turn(angle_rad: float) -> Array:
 
 
 class Traces:
-    """Traces of one car."""
+    """Traces of one car on the road."""
 
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, place: int = 0, *, uneven: bool = False

@@ -1,4 +1,4 @@
-"""The paper's claims, and the one judge of all of them.
+"""Judgement of the paper's claims.
 
 `statements.toml` has a row for each statement: its text, its criterion in words, the values that decide, and its
 conditions. A condition is a requirement (`analysis.requirement`) on metrics of the runs none, ars and afs. The limits
@@ -72,14 +72,14 @@ class Statement:
 
     @functools.cached_property
     def requirements(self) -> list[Requirement]:
-        """The conditions, to be evaluated."""
+        """Parsed conditions of the statement."""
         names = Names((*SYSTEMS, TOGETHER), ("",))
         return [Requirement(text, names, Source("the claims"), (self.id,)) for text in self.conditions]
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A checked statement.
+    """A statement of the paper, judged on recordings.
 
     Attributes:
         statement: The statement.
@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre, allowing for the last row at one step before the end."""
+    """Return whether a run ended before its manoeuvre, where the last row may be one step before the end."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -171,7 +171,7 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> tuple[str, float]:
-    """Return why no claim can pass on three runs, and the distance of this obstacle from vanishing, 0 to 1."""
+    """Return the reason why no claim can pass on three runs, and its distance from vanishing, 0 to 1."""
     # A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
     # `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
     # demand as much of an actuator that its system does not have: an action that was not performed proves nothing.
@@ -197,7 +197,7 @@ def straight_ahead(recording: RecordingLike) -> slice:
 
 
 def largest_action(recording: RecordingLike, demand: str) -> float:
-    """Return by how much more a system turns wheels in a manoeuvre than straight ahead before it [rad]."""
+    """Return the largest wheel angle that a system adds in a manoeuvre, beyond the angle straight ahead [rad]."""
     # A controller responds to noise and offsets of its sensors too. Noise of an instant moves no car, and an offset
     # acts the same straight ahead. Both angles are therefore largest magnitudes of the demanded angle's mean over
     # `MEAN_S`.

@@ -58,7 +58,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting file."""
+    """A setting of car, driver and manoeuvres, as read from its file."""
 
     title: str = ""
     """One line for people."""
@@ -116,7 +116,7 @@ def not_reproduced(vehicle: str) -> dict[str, str]:
 
 
 class Verdict(StrEnum):
-    """Verdict of a claim."""
+    """Verdict of a claim, compared with the list of claims that are not reproduced."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -136,7 +136,7 @@ class Judged(NamedTuple):
 
 @dataclass(frozen=True)
 class Scorecard:
-    """Claims with their verdicts."""
+    """Claims with their verdicts, and the setting of their runs."""
 
     judged: tuple[Judged, ...]  # all of them, in the order given
     setting: str = LITERATURE  # setting of the runs; `paper`, `literature` or empty
@@ -144,7 +144,7 @@ class Scorecard:
 
     @property
     def counts(self) -> dict[Verdict, int]:
-        """Number of claims by verdict, without verdicts of no claim."""
+        """Number of claims for each verdict that occurs."""
         verdicts = [item.verdict for item in self.judged]
         return {verdict: verdicts.count(verdict) for verdict in Verdict if verdict in verdicts}
 

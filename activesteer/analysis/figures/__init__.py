@@ -1,4 +1,4 @@
-"""The paper's figures from recordings: the same numbers, the same curves 1, 2, 3, and units at every axis.
+"""The paper's figures from recordings, with the same values and curves 1, 2, 3, and units at every axis.
 
 `draw_all` makes the figures of whole reproductions, `figure_for` makes one figure of a manoeuvre. matplotlib is an
 extra of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made
@@ -203,7 +203,7 @@ def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str 
 
 
 def figure_for(kind: str) -> Callable[[Mapping[str, RecordingLike], str | os.PathLike[str]], Path]:
-    """Return the function that draws a kind of manoeuvre at a glance.
+    """Return the function that draws an overview of a kind of manoeuvre.
 
     Args:
         kind: Kind of the manoeuvre.

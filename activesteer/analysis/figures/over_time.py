@@ -95,7 +95,7 @@ def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width
 
 
 def friction_label(low: float, high: float) -> str:
-    """Return the label of places with another friction, which keeps them out of the legend of their axis."""
+    """Return the label of areas with a different friction, which the legend of the axis leaves out."""
     return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 

@@ -120,7 +120,7 @@ def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
-    """Return numbers for JSON, which has no nan, with as many digits as can be seen."""
+    """Return numbers for JSON, with None for nan, and only digits that can be seen."""
     finite = np.isfinite(values)
     if decimals is None:
         known = values[finite]

@@ -27,7 +27,7 @@ from activesteer.recording.recording import run_names
 
 
 def judge(group: Group) -> Scorecard:
-    """Check the paper's claims about the runs of a group, or say in an empty scorecard why there are none."""
+    """Check the paper's claims about the runs of a group, or return an empty scorecard with the reason."""
     # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
     recordings = {run.name: run.recording for run in group.runs}
     check = claims_for(group.runs[0].recording)

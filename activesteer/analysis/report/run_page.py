@@ -129,7 +129,7 @@ def _swatch(look: RunLook) -> Markup:
 
 
 def _outcome(found: Mapping[str, Any]) -> Markup:
-    """Return the losses of a run and the requirements that it kept."""
+    """Return the failures of a run and the requirements that it met."""
     looks = ((failed, found["losses"]), (passed, found["kept"]))
     return Markup(" ").join(look(", ".join(words), chip=True) for look, words in looks if words)
 
@@ -271,7 +271,7 @@ def _facts(groups: Sequence[Group], made: date) -> list[str]:
 
 
 class Row(NamedTuple):
-    """A parameter."""
+    """A parameter, and its value in each run."""
 
     key: str  # its name, with the names of its tables
     values: tuple[str, ...]  # its value in each run; a single value if all runs have the same

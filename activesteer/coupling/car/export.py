@@ -314,7 +314,7 @@ def _renamed_engine(path: Path, token: str) -> tuple[str, bytes]:
 
 
 def _compiled(files: Mapping[str, bytes], engine: tuple[str, bytes], token: str) -> bytes:
-    """Return the compiled library."""
+    """Compile the C code of a car with its objects, and return the shared library."""
     compiler = os.environ.get("CC", "cc")
     if shutil.which(compiler) is None:
         raise ModelError(

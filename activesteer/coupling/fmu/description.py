@@ -69,7 +69,7 @@ class Archive:
         limits.check_count(size, limits.MAX_FMU_DESCRIPTION_BYTES, "bytes", self._error, file=DESCRIPTION)
 
     def kept(self, most_bytes: int) -> dict[str, bytes]:
-        """Return what a recording keeps of the FMU: the file, or the description and the digest of a larger one."""
+        """Return the data of the FMU for a recording: the file, or description and digest of a larger one."""
         if len(self._data) <= most_bytes:
             return {self.path.name: self._data}
         return {f"{self.path.stem}.sha256": self.key.encode(), f"{self.path.stem}.xml": self.description}
@@ -127,7 +127,7 @@ class Variable(NamedTuple):
 
 
 class Description(NamedTuple):
-    """Description of an FMU."""
+    """Description of an FMU: version, variables and library."""
 
     version: int  # 2 or 3
     token: str  # GUID or instantiation token
@@ -240,7 +240,7 @@ def _library(archive: Archive, identifier: str, kind: Kind) -> str:
 
 
 def _declared_unit(name: str | None, base: Any) -> Unit | None:
-    """Return a unit as an FMU declares it, by its base unit as FMPy reads it, or None if nobody knows the unit."""
+    """Return a unit as an FMU declares it, by its base unit as FMPy reads it, or None for an unknown unit."""
     if name is None or base is None:
         return find_unit(name) if name else None
     others = any(getattr(base, other) for other in ("A", "K", "mol", "cd"))

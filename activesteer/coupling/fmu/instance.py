@@ -32,7 +32,7 @@ START_LIMIT_S: Final = 30.0
 
 
 class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
-    """An FMU failed: what it did, in words."""
+    """An FMU failed. The message describes the failure."""
 
 
 class Group(NamedTuple):
@@ -45,7 +45,7 @@ class Group(NamedTuple):
 
 
 class Spec(NamedTuple):
-    """Everything that an instance is made from."""
+    """All data that an instance is created from."""
 
     library: str  # path of the shared library
     version: int  # 2 or 3
@@ -164,7 +164,7 @@ class LocalInstance:
 
     @property
     def _state(self) -> str:
-        """The word for a state in the names of functions."""
+        """Word for a state in the names of the FMI functions."""
         return "FMUstate" if self._spec.version == 2 else "FMUState"
 
     def _kept(self, state: Any, steps: int) -> int:
@@ -264,7 +264,7 @@ class IsolatedInstance:
         self._ask(json.dumps(spec).encode(), "its initialisation", limit_s=max(limit_s, START_LIMIT_S))
 
     def step(self, values: Sequence[float]) -> tuple[float, ...]:
-        """See `LocalInstance`."""
+        """Advance the FMU in its process (see `LocalInstance.step`)."""
         doing = f"the step at {self._steps * self._step_s:g} s"
         answer = self._ask(_STEP + struct.pack(f"={len(values)}d", *values), doing, self._step_bytes)
         if len(answer) != self._step_bytes:
@@ -273,24 +273,24 @@ class IsolatedInstance:
         return self._unpack(answer)
 
     def save(self) -> int:
-        """See `LocalInstance`."""
+        """Save the state in the process, and return its number."""
         return self._number(_SAVE)
 
     def restore(self, state: int) -> None:
-        """See `LocalInstance`."""
+        """Return to a state that the process has saved."""
         self._ask(_RESTORE + str(state).encode())
 
     def forget(self, state: int) -> None:
-        """See `LocalInstance`."""
+        """Free a state that the process has saved, if the process is alive."""
         if self._child.alive:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
-        """See `LocalInstance`."""
+        """Return a state that the process has saved as bytes."""
         return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:
-        """See `LocalInstance`."""
+        """Give the process a state as bytes, and return its number there."""
         return self._number(_DESERIALISE + content)
 
     def _number(self, request: bytes) -> int:

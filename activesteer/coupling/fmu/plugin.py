@@ -50,7 +50,7 @@ class Link(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals that messages contain."""
+    """Signals in the messages of a block, by name."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
     others: frozenset[str]  # names of fields that are no numbers
@@ -92,7 +92,7 @@ def signals_of(messages: Sequence[type[Any]]) -> Signals:
 def linked(
     variables: Mapping[str, Variable], signals: Signals, given: Mapping[str, Any], source: Source
 ) -> tuple[list[Link], list[str]]:
-    """Match variables with signals."""
+    """Link each variable with its signal, and return the links and the variables without a signal."""
     links, left = [], []
     for name, variable in variables.items():
         entry = given.get(name)
@@ -232,7 +232,7 @@ class FmuBlock:
         return self._held
 
     def _when(self) -> str:
-        """The time of the current step, in words."""
+        """Time of the current step, in words."""
         return f", {(self._steps - 1) // self._every * self._step_s:g} s after its initialisation"
 
     def _unread(self, messages: Sequence[Any]) -> Exception:

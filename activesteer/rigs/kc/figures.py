@@ -1,4 +1,4 @@
-"""Pictures of kinematics and compliance, both wheels. matplotlib is an extra, imported when a picture is made."""
+"""Figures of kinematics and compliance of both wheels, drawn by matplotlib, an extra."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> l
 
 
 class Grid(NamedTuple):
-    """A picture with one row per quantity and one column per axle."""
+    """A figure with one row per quantity and one column per axle."""
 
     title: str
     rows: Sequence[Row]
@@ -294,7 +294,7 @@ def _ideal_outer_deg(axle: Axle, inner_deg: Array) -> Array:
 
 
 def _targets(result: KcResult) -> Picture:
-    """Place of every metric between the ends of its band."""
+    """Position of each metric within its target band."""
     rows = [entry for entry in result.metrics if entry.band is not None]
     curves = [
         Curve(

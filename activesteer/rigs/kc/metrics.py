@@ -121,7 +121,7 @@ def _damper_ratio(axle: Axle) -> float:
 
 
 def _contact(axle: Axle, end: int) -> float:
-    """Travel where a damper's length reaches one end of the slack range of its stops [mm]."""
+    """Travel at which a damper's length reaches one end of the slack range of its stops [mm]."""
     model = axle.measured.vehicle.model
     limit = float(model.tendon_lengthspring[model.tendon(f"{axle.name[0]}l_damper").id, end])
     sweep = axle.sweep("parallel_travel")
@@ -309,7 +309,7 @@ def _braking_recession(axle: Axle) -> float:
 
 
 def _bushes_Npmm(axle: Axle) -> Array:
-    """Stiffness of one of two equal bushes in series in each link, unloaded, or nan without links [N/mm]."""
+    """Stiffness of one of two equal bushes in series in each unloaded link, or nan without links [N/mm]."""
     model = axle.measured.vehicle.model
     rates = []
     for index in range(model.ntendon):

@@ -217,7 +217,7 @@ def _named(linear: _Linear) -> dict[str, Mode]:
 
 
 def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
-    """Return inertia and Jacobian rows of each motion after which a mode is named."""
+    """Return inertia and Jacobian rows of each motion that can name a mode."""
     model, data = linear.model, linear.data
     chassis = model.body("chassis").id
     along, about = linear.velocity_map(chassis, data.xipos[chassis])

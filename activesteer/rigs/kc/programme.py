@@ -191,7 +191,7 @@ class Measured:
 
 
 def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> Measured:
-    """Run the whole programme."""
+    """Measure all sweeps and steering axes of a car on the rig."""
     load_N = fb.wheel_outputs(vehicle.data, 4)["fz_N"].copy()
     stiffness = (
         tyre_stiffness(tyres[0], vehicle.parameters.tyres.front_pressure_Pa, float(load_N[:2].mean())),

@@ -142,7 +142,7 @@ def read_cases(path: Path) -> Samples:
 
 
 def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
-    """Return the design with its kind chosen, after checking that its parts do not contradict each other."""
+    """Return the design with its kind, after a check that its parts do not contradict each other."""
     all_grids = all(factor.kind == "grid" for factor in factors)
     kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")
     where = ("design", "kind")
@@ -175,7 +175,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
 
 
 def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:
-    """Refuse a design with too many combinations, of grids and sample, before any of them is made."""
+    """Reject a design with too many combinations before any combination is made."""
     sizes = [len(factor.values) for factor in factors if factor.kind == "grid"]
     count = math.prod(sizes) * points
     if count > MAX_SAMPLES:

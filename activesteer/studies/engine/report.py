@@ -56,7 +56,7 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
 
 
 def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> Page:
-    """Return the page: what ran, then what `study.js` draws, then the factors and the file of the study."""
+    """Return the page: the runs, then the plots of `study.js`, then the factors and the file of the study."""
     title, data = study.title or name, _data(study, table)
     counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
     parts = (("Manoeuvres", "maneuver"), ("Vehicles", "vehicle"), ("Controllers", "controller"))

@@ -133,7 +133,7 @@ class Settings:
 
 
 class Request(NamedTuple):
-    """Request for one run."""
+    """Request for one run: its manoeuvre, car, sample and controller."""
 
     run: int
     sample: int
@@ -248,7 +248,7 @@ CURVE: Final = "curve_"
 
 
 class Status(StrEnum):
-    """Status of a run."""
+    """Status of a run in the results."""
 
     OK = "ok"
     UNEVALUATED = "unevaluated"
@@ -263,7 +263,7 @@ Row = dict[str, Any]
 
 
 def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.inf) -> list[Row]:
-    """Drive some runs."""
+    """Drive requested runs, and return their rows."""
     end_s = time.monotonic() + most_s
     if problem := _problem(digest({"expected": settings.expected}), settings):
         return [failed_row(settings, request, Status.FAILED, problem) for request in requests]
@@ -277,7 +277,7 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
 
 
 def _give_memory_back() -> None:
-    """Return free memory to the system, because the C library would keep it in ever more pieces."""
+    """Return free memory to the system, because the C library would keep it in more and more fragments."""
     with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -89,7 +89,7 @@ _KEY_CHARACTERS: Final = 200
 
 
 class Progress(NamedTuple):
-    """Progress of a study."""
+    """Progress of a study in its folder."""
 
     total: int  # runs of the study
     done: int  # runs that have a row

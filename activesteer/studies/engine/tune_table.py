@@ -34,7 +34,7 @@ _IMPLAUSIBLE: Final = 0.3
 
 
 class Goal(StrEnum):
-    """Goals of a search."""
+    """Goals that a search can have."""
 
     MINIMISE = "minimise"
     SATISFY = "satisfy"
@@ -62,7 +62,7 @@ class TuneTable:
 
     @property
     def goal(self) -> Goal:
-        """The goal."""
+        """Goal of the search."""
         return next(goal for goal in Goal if getattr(self, goal))
 
 

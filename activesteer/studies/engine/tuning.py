@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of a search."""
+    """Result of a search: the sets that were tried, and the best ones."""
 
     goal: Goal
     done: int  # number of all sets that were tried
@@ -155,7 +155,7 @@ def tune(
 
 
 def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
-    """Return the search of a study in a folder as far as it has come, also one of another version of the package."""
+    """Return the progress of the search in a folder, even if another version of the package made it."""
     (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
     return search.result(search.stored())
 

@@ -75,7 +75,7 @@ class LocalProcesses(Workers):
         return ProcessPoolExecutor(self._count, multiprocessing.get_context("spawn"), initializer=_begin_worker)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """See `Workers`."""
+        """Start a task in the pool (see `Workers.submit`)."""
         # The pool starts processes here when it needs them. They never receive Ctrl-C, not even while starting: signals
         # that are blocked here stay blocked there.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -90,7 +90,7 @@ class LocalProcesses(Workers):
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def died(self, error: BaseException) -> bool:
-        """See `Workers`."""
+        """Return True if the pool is broken, because one of its processes died."""
         return isinstance(error, BrokenExecutor)
 
     def replace(self) -> None:
@@ -99,7 +99,7 @@ class LocalProcesses(Workers):
         self._pool = self._new_pool()
 
     def close(self, *, abandon: bool) -> None:
-        """See `Workers`."""
+        """End the pool, and terminate its processes if abandoned."""
         if abandon:
             for process in list((self._pool._processes or {}).values()):
                 process.terminate()
@@ -165,7 +165,7 @@ class DaskCluster(Workers):
         self.in_flight = max(32, _TASKS_A_WORKER * len(self._client.nthreads()))
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """See `Workers`."""
+        """Start a task through the executor (see `Workers.submit`)."""
         return self._executor.submit(function, *arguments)
 
     def died(self, error: BaseException) -> bool:
@@ -300,7 +300,7 @@ class Outcome(NamedTuple):
     error: BaseException | None
 
     def result(self) -> Any:
-        """Return the result."""
+        """Return the result, or raise the error of the task."""
         if self.error is not None:
             raise self.error
         return self.value

@@ -41,7 +41,7 @@ RADIUS_TEST: Final = "100 m"
 
 @dataclass(frozen=True)
 class Identification:
-    """Result of an identification.
+    """Result of an identification: handling metrics and models.
 
     Attributes:
         vehicle: Name of the vehicle.
@@ -56,7 +56,7 @@ class Identification:
     two_track: TwoTrackParameters
 
     def table(self) -> str:
-        """Return all as text: a column per test, then the keys of [single_track] and [two_track]."""
+        """Return the result as text: a column per test, then the keys of [single_track] and [two_track]."""
         shown = comparison(self.tests)
         for name, lines in self.lines().items():
             shown += "\n".join([f"\n\n[{name}]", *(f"{key} = {value}" for key, value in lines.items())])

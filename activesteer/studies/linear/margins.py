@@ -1,4 +1,4 @@
-"""Stability margins of the loop of controller, actuators, car and sensors, the worst ones of a study, and their page.
+"""Stability margins of the loop of controller, actuators, car and sensors, for one car or a study.
 
 The loop runs from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
 the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
@@ -166,7 +166,7 @@ def opened(returned: Response, loop: str) -> Response:
 
 
 def opened_at_both(returned: Response) -> tuple[Response, Response]:
-    """Return the loops of a common factor f on both demands: det(1 - f M) = 0 if 1 + f L = 0, -L an eigenvalue of M."""
+    """Return the loops L of a common factor f on both demands, with 1 + f L = 0 where det(1 - f M) = 0."""
     values: Response = np.asarray(np.linalg.eigvals(returned), dtype=np.complex128)
     for before, here in itertools.pairwise(values):
         if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():

@@ -38,7 +38,7 @@ def guarded(x: float) -> float:
 
 @compiled
 def sine_formula(b: float, c: float, d: float, e: float, x: float) -> float:
-    """D sin(C atan(Bx - E(Bx - atan Bx))) with E not above 1 (equation 4.E9)."""
+    """Sine form of the Magic Formula: D sin(C atan(Bx - E(Bx - atan Bx))) with E not above 1 (equation 4.E9)."""
     e = min(e, 1.0)
     bx = b * x
     return d * math.sin(c * math.atan(bx - e * (bx - math.atan(bx))))
@@ -46,7 +46,7 @@ def sine_formula(b: float, c: float, d: float, e: float, x: float) -> float:
 
 @compiled
 def sign(x: float) -> float:
-    """-1, 0 or 1."""
+    """Sign of a number: -1, 0 or 1."""
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
@@ -121,7 +121,7 @@ def lateral_force(
 
 @compiled
 def _cosine_formula(b: float, c: float, e: float, x: float) -> float:
-    """cos(C atan(Bx - E(Bx - atan Bx))) with E not above 1."""
+    """Cosine form of the Magic Formula: cos(C atan(Bx - E(Bx - atan Bx))) with E not above 1."""
     e = min(e, 1.0)
     bx = b * x
     return math.cos(c * math.atan(bx - e * (bx - math.atan(bx))))
