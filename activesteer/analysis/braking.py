@@ -117,7 +117,7 @@ def _largest_slip(recording: RecordingLike, speed: Array, braked: slice) -> floa
 BEFORE_S: Final = 0.5
 """Length of the window before the brake whose mean is the steady state [s]."""
 AFTER_S: Final = 1.0
-"""Time after the beginning of braking at which the car is compared with its circle [s]."""
+"""Time after the start of braking at which the car is compared with its circle [s]."""
 END_SPEED_MPS: Final = 1.0
 """Speed at which braking ends [m/s]."""
 MIN_YAW_RATE_RADPS: Final = math.radians(0.5)

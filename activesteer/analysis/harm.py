@@ -35,7 +35,7 @@ Metrics = Mapping[str, float | None]
 LOST_SIDESLIP_RAD: Final = math.radians(20.0)
 """Largest sideslip angle of a car that is not lost [rad]."""
 TURNED_ROUND_RAD: Final = math.radians(90.0)
-"""Sideslip angle beyond which the car slides backwards, and its metrics say nothing [rad]."""
+"""Sideslip angle beyond which the car slides backwards, and its metrics are meaningless [rad]."""
 LOST: Final = "lost"
 """Text in place of the metrics of a car that has turned round."""
 

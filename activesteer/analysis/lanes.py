@@ -97,7 +97,7 @@ def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
 
 
 _NEAR: Final = 10
-"""Points of a path to either side of the last place in which a car is looked for: 5 m."""
+"""Points of a path to either side of the last place of a car in which the search looks: 5 m."""
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
@@ -185,7 +185,7 @@ BEFORE_M: Final = 20.0
 AFTER_M: Final = 50.0
 """Length of the road before the first gate and after the last gate [m]."""
 BESIDE_M: Final = 2.0
-"""Width of the road beside the course [m]. A car further off is outside the picture."""
+"""Width of the road next to the course [m]. A car further off is outside the plot."""
 
 
 class CourseView(NamedTuple):

@@ -41,7 +41,7 @@ _MEASURABLE: Final[tuple[Callable[[RecordingLike], dict[str, float]], ...]] = (
     partial(peak, channel="steering_wheel_rad"),
     lambda recording: {"speed_end_mps": float(recording["speed_mps"][-1])},
 )
-"""Functions that evaluate what a test car can measure."""
+"""Functions that evaluate the quantities that a test car can measure."""
 
 
 def general_metrics(recording: RecordingLike) -> dict[str, float]:

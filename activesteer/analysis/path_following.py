@@ -24,7 +24,7 @@ AFTER_S: Final = 3.0
 LONGEST_LAG_S: Final = 0.6
 """Longest lag [s]: a quarter of the period of a slalom of 36 m at 100 km/h."""
 _LAP_STEP_S: Final = 0.01
-"""Interval at which the car's place along a path is looked for [s]."""
+"""Interval at which the car's place along a path is searched [s]."""
 SIGNALS: Final = ("yaw_rate_radps", "sideslip_rad", "ay_mps2", "roll_rad")
 """Channels that are evaluated."""
 OSCILLATING: Final = ("yaw_rate_radps", "sideslip_rad", "ay_mps2", "steering_wheel_rad")

@@ -26,7 +26,7 @@ RATE_SPAN_S: Final = 0.01
 
 ANGLES_COUNT_ABOVE_MPS: Final = 10.0 / 3.6
 """Speed above which angles between velocities count in metrics [m/s]. A car that brakes to rest swings on its tyres,
-and its sideslip angle then says nothing about its path."""
+and its sideslip angle is then unrelated to its path."""
 
 _ALL: Final = slice(None)
 
@@ -203,7 +203,7 @@ FAST_RADPS: Final = math.radians(75.0)
 FAST_FOR_S: Final = 0.2
 """Least duration of this rate [s]."""
 THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle whose first passing is the beginning of steer [rad]. The range ends before it."""
+"""Steering wheel angle whose first passing is the start of steer [rad]. The range ends before it."""
 RANGE_S: Final = 1.0
 """Length of the range [s]."""
 _AVERAGED_S: Final = 0.1

@@ -47,7 +47,7 @@ INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 END_OF_STEER: Final = "end of steer"
 DISPLACEMENT_TIME_S: Final = 1.07
-"""Time after the beginning of steer at which the lateral displacement is taken [s]. FMVSS 126 requires 1.83 m from a
+"""Time after the start of steer at which the lateral displacement is taken [s]. FMVSS 126 requires 1.83 m from a
 car up to 3500 kg, from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
 """Largest allowed ratios at `INSTANTS_S`."""

@@ -30,7 +30,7 @@ MIN_STEP_RAD: Final = math.radians(0.5)
 
 
 SIGNALS: Final = {"yaw_rate_radps": 1e-3, "ay_mps2": 1e-2, "roll_rad": 1e-4, "sideslip_rad": 1e-4}
-"""Channel -> smallest steady-state value for times and overshoot; below it the run says nothing about them."""
+"""Channel -> smallest steady-state value for times and overshoot; below it they are meaningless."""
 STEADY_CHANNELS: Final = ("steering_wheel_rad", "front_steer_rad", "rear_steer_rad", "superposition_rad")
 """Channels of which only the steady-state value is given."""
 

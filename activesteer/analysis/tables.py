@@ -55,7 +55,7 @@ class Change(StrEnum):
     BETTER = "better"
     WORSE = "worse"
     SAME = "same"
-    """Neither a driver nor a sensor in a test car could tell the values apart."""
+    """Neither a driver nor a sensor in a test car can distinguish the values."""
     OTHER = "other"
     """The values differ, and neither is better."""
 

@@ -33,7 +33,7 @@ SUCCESSORS: Final = {
         ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"
     ),
 }
-"""Removed command, or command and option -> what does its work now."""
+"""Removed command, or command and option -> its replacement."""
 
 
 Part = Callable[[Any], object]

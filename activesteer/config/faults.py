@@ -30,11 +30,11 @@ class Actuator(NamedTuple):
 
 
 ANGLE_SENSOR: Final = "steering_wheel_sensor"
-"""Sensor that tells controllers the driver's demand if the sensor is not ideal."""
+"""Sensor that gives controllers the driver's demand if the sensor is not ideal."""
 
 
 MOTOR: Final = "motor_"
-"""Beginning of the parts that are electric motors. Their places follow."""
+"""Prefix of the parts that are electric motors, followed by their places."""
 ACTUATORS: Final = {
     "rear": Actuator(("rl_steer", "rr_steer")),
     "rear_left": Actuator(("rl_steer",)),

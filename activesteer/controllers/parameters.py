@@ -115,7 +115,7 @@ class EscParameters(YawMomentParameters):
     torque_limit_Nm: Annotated[float, Range(0.0, 1e4)]
     """Largest brake torque at a wheel [Nm]."""
     least_speed_mps: Annotated[float, Range(1.0, 20.0)]
-    """Speed below which the controller rests [m/s]."""
+    """Speed below which the controller is inactive [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class IntegratedParameters:
     brake_scale_N: _Size
     """F_0: scale of the brake force at a wheel [N]."""
     brake_threshold_Nm: _Size
-    """Missing yaw moment below which the brakes do nothing [Nm]."""
+    """Missing yaw moment below which the brakes are inactive [Nm]."""
     brake_side_loss: _Fraction
     """Side force that a fully used tyre loses per brake force [-]."""
     side_difference_Pa: Annotated[float, Range(0.0, 1e8)]

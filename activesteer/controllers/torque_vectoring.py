@@ -43,9 +43,9 @@ from activesteer.errors import ControllerError
 _SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
 """Sign of a torque that turns the car to the left, order of `CORNERS`."""
 _FREE_SLIP: Final = 0.03
-"""Slip up to which a wheel gets all of its torque [-]: that of a rear wheel of the compact at 1.7 kN."""
+"""Slip up to which a wheel gets all of its torque [-]: the slip of a rear wheel of the compact at 1.7 kN."""
 _MOST_SLIP: Final = 0.06
-"""Slip from which a wheel gets nothing [-]: further slip costs more side force than it gives drive force."""
+"""Slip from which a wheel gets no torque [-]: further slip costs more side force than it gives drive force."""
 _LEAST_RADPS: Final = 1.0
 """Wheel speed below which a motor's power sets no limit [rad/s]."""
 

@@ -33,7 +33,7 @@ GRAVITY_MPS2: Final = 9.81
 DEFAULT_TIMESTEP_S: Final = 0.001
 """Step of the engine and of the control loop [s]."""
 CURVE_STEP_S: Final = 0.02
-"""Time between two values of a channel that a study keeps over time [s]: enough for a picture."""
+"""Time between two values of a channel that a study keeps over time [s]: enough for a plot."""
 
 SYSTEM_LABELS: Final = {"none": "1 no control", "ars": "2 active rear steering", "afs": "3 active front steering"}
 """Labels of the three systems, numbered as in the paper's figures."""
@@ -43,7 +43,7 @@ RUN_COLOURS: Final = ("#333333", "#d55e00", "#0072b2", "#009e73", "#cc79a7", "#e
 RUN_COLOURS_ON_DARK: Final = ("#c9ccd1", "#f0843c", "#4aa8e0", "#2bbd8e", "#e39cc4", "#f0b429")
 """The same hues for a dark background."""
 RUN_DASHES: Final = ((), (7.0, 2.0), (7.0, 1.5, 1.5, 1.5), (3.0, 1.5), (10.0, 3.0), (1.5, 1.0))
-"""Dashes and gaps of their curves, in line widths: they tell curves apart in grey and show the curve below."""
+"""Dashes and gaps of their curves, in line widths: they distinguish curves in grey and show the curve below."""
 
 
 class RunLook(NamedTuple):

@@ -21,7 +21,7 @@ counts as `claims.judge` says, so that noise cannot pass for it."""
 SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
 SIDESLIP_RAD: Final = math.radians(0.1)
-"""Difference of two sideslip angles of an instant or an oscillation [rad]: an optical sensor is good to 0.1 deg."""
+"""Difference of two sideslip angles, momentary or of an oscillation [rad]: an optical sensor is good to 0.1 deg."""
 YAW_RATE_RADPS: Final = math.radians(0.5)
 """Difference of two yaw rates [rad/s]: humans notice 0.6 deg/s of a quick rotation (Grabherr et al. 2008), production
 sensors have 0.1 to 0.2 deg/s of noise."""

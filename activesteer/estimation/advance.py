@@ -51,7 +51,7 @@ from activesteer.estimation.two_track_model import SLOWEST_MPS, follow, follow_r
 from activesteer.native.compilation import compiled, inlined
 
 _SHORTEST_S: Final = 0.004
-"""Shortest time between two steps of the filters, and step of the model on its way to the present [s]."""
+"""Shortest time between two steps of the filters, and step of the model on its way to the current time [s]."""
 _USED_FRACTION: Final = 0.85
 """Lower bound of the friction, as a fraction of the acceleration over the largest one that the tyres allow on the road
 of their files. The largest of these, forgotten with `friction_s`, over this fraction is an upper bound beyond the

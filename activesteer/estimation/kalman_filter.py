@@ -80,7 +80,7 @@ _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
 make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does not know; this is three times as much."""
 _SURPRISING: Final = 4.0
-"""Squared error over its expected variance above which a value says nothing about the stiffness: two standard
+"""Squared error over its expected variance above which a value is not used for the stiffness: two standard
 deviations. Something else has then changed."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to that of the front tyres, on a new road: for a tenth

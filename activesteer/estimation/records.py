@@ -21,7 +21,7 @@ LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OF
 N_STATES: Final = 13
 """Number of states; those from `FRICTION` on are properties of road and tyres, which are not learned while braking."""
 N_MOVING: Final = 4
-"""Number of states that depend on others after an interval; the others, behind them, depend on themselves alone."""
+"""Number of states that depend on others after an interval; the others, behind them, depend only on themselves."""
 SAID: Final = (
     "yaw_rate_radps", "ay_mps2", "ax_mps2", "steering_wheel_rad", "rear_steer_rad", "superposition_rad",
     *(f"{corner}_spin_radps" for corner in ("fl", "fr", "rl", "rr")),

@@ -52,7 +52,7 @@ class EstimatorParameters:
     """Standard deviation of the stiffness of the tyres of an axle, relative to new tyres under the known load: wear,
     temperature, winter tyres, load."""
     stiffness_s: _Positive = 100.0
-    """Time constant with which the stiffness returns to that of new tyres [s]."""
+    """Time constant with which the stiffness returns to the stiffness of new tyres [s]."""
     slip_angle_s: _Positive = 1.0
     """Time constant of the slip angle error [s]."""
     bank_std_mps2: _Positive = 0.3

@@ -59,7 +59,7 @@ LARGEST_FRICTION: Final = 1.5
 """Bounds of the estimated friction [-]."""
 LEAST_RATIO: Final = 0.5
 LARGEST_RATIO: Final = 1.5
-"""Bounds of the friction of the rear tyres relative to that of the front tyres [-]."""
+"""Bounds of the friction of the rear tyres relative to the friction of the front tyres [-]."""
 LEAST_STIFFNESS: Final = 0.3
 LARGEST_STIFFNESS: Final = 2.0
 """Bounds of the estimated stiffness of the tyres relative to new ones [-]."""

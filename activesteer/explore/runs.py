@@ -70,7 +70,7 @@ _CAR: Final = {
 _UNIT: Final = "control unit and bus"
 """Group of the parameters that all controllers share."""
 _TIMES: Final = 4.0
-"""Greatest value of the slider of a gain, in multiples of its present value."""
+"""Greatest value of the slider of a gain, in multiples of its current value."""
 _STEPS: Final = 200
 _COVERED: Final = ("controllers", "single_track", "two_track")
 """Tables of a vehicle that controllers read; the controllers declare what they take from them."""

@@ -131,7 +131,7 @@ _ROAD: Final = (
     *((f"path_left_{ahead:g}s_m", -100.0, 100.0) for ahead in _AHEAD_S),
 )
 _DISTANCES_M, _DISTANCES_S = np.array([0.0, 0.1, *(0.0 for _ in _AHEAD_S)]), np.array([0.0, 0.0, *_AHEAD_S])
-"""Points of the path that are looked at: distances [m], and times at the present speed [s]."""
+"""Points of the path that are looked at: distances [m], and times at the current speed [s]."""
 _WINDOW_M: Final = 5.0
 _ENDS: Final = ("", "time", "off course", "lost", "stopped", "diverged")
 _END_NAMES: Final = np.array(_ENDS, dtype=object)

@@ -28,9 +28,9 @@ class SteeringTable:
     rack_m: tuple[float, ...] | None = None
     """Rack positions from the centre instead of angles, positive steers left [m]."""
     factor: float = 1.0
-    """Scale of the column, for a recorded signal with a scale of its own."""
+    """Scale of the column, for a recorded signal with a separate scale."""
     delay_s: float = 0.0
-    """Time by which the column comes later, for a recorded signal with a clock of its own [s]."""
+    """Time by which the column comes later, for a recorded signal with a separate clock [s]."""
 
     def __post_init__(self) -> None:
         """Check that times come with one of the two columns, and that factor and delay act on it."""
@@ -169,7 +169,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
     parking_brake: ParkingBrakeTable | None = None
     """Parking brake, at the rear wheels. Default: released."""
     wheel_torques: WheelTorqueTable | None = None
-    """Torques of each wheel, without the lag of the engine. If given, nothing else drives or brakes the car."""
+    """Torques of each wheel, without the lag of the engine. If given, neither engine nor brakes act on the car."""
     drive_csv: str | None = None
     """CSV file with the column time_s and any of the columns fl_drive_Nm ... rr_brake_Nm."""
     drive: DriveMode = "hold_speed"

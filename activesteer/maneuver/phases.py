@@ -41,7 +41,7 @@ class Until:
     """End of a phase: the first condition that holds, with signs of a manoeuvre to the left."""
 
     time_s: Annotated[float, Range(0.0, 3600.0)] | None = None
-    """Time since the beginning of the phase [s]."""
+    """Time since the start of the phase [s]."""
     yaw_rate_above_radps: float | None = None
     """Yaw rate above a value [rad/s]."""
     yaw_rate_below_radps: float | None = None

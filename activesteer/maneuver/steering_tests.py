@@ -18,7 +18,7 @@ from activesteer.errors import ManeuverError
 from activesteer.maneuver.base import SIGNS, DriveMode, Maneuver, Search, Side, check_begin, check_speed, within
 
 _SEARCH_S: Final = 4.5
-"""Length of a run of the amplitude search after the beginning of the step [s]."""
+"""Length of a run of the amplitude search after the start of the step [s]."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +109,11 @@ class Sweep:
     amplitude_rad: Annotated[float, Range(0.0, 15.0)] = math.radians(9.0)
     """Amplitude [rad]."""
     first_Hz: Frequency = 0.1
-    """Frequency at the beginning [Hz]."""
+    """Frequency at the start [Hz]."""
     last_Hz: Frequency = 5.0
     """Frequency at the end [Hz]."""
     fade_s: Annotated[float, Range(0.0)] = 1.0
-    """Time in which the amplitude rises at the beginning, and falls at the end [s]."""
+    """Time in which the amplitude rises at the start, and falls at the end [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,7 +211,7 @@ class RandomSignal:
     seed: Annotated[int, Range(0)] = 0
     """Seed of the random phases."""
     fade_s: Annotated[float, Range(0.0)] = 1.0
-    """Time in which the signal is faded in at the beginning [s]."""
+    """Time in which the signal is faded in at the start [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -315,7 +315,7 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
     steer: DwellInput
     """The sine."""
     drive: DriveMode = "coast"
-    """Drive from the beginning of the sine: `coast`, which FMVSS 126 requires, or `hold_speed`."""
+    """Drive from the start of the sine: `coast`, which FMVSS 126 requires, or `hold_speed`."""
 
     def __post_init__(self) -> None:
         """Check that the sine ends within the run, and that the speed suits a search for A."""

@@ -25,7 +25,7 @@ STEERING: Final = "steering_wheel_rad"
 _OF_RUNS: Final = ("runs", "predict", "factors", "filter", "noise_allowance")
 """Keys that only measured runs can have."""
 CIRCLE_KEYS: Final = ("radius_m", "ay_mps2", "zero_deg", "body_roll", "stiff_column")
-"""Keys of a measured circle that an interval may have, next to those of the car."""
+"""Keys of a measured circle that an interval may have, in addition to the keys of the car."""
 Window = tuple[float, ...]
 """Start and end in the time of the file [s]."""
 
@@ -37,7 +37,7 @@ class RunTable:
     name: str
     """Its name."""
     files: tuple[str, ...]
-    """Files of the data logger, beside this file."""
+    """Files of the data logger, in the folder of this file."""
     map: str = ""
     """Map file of `activesteer import`."""
     fit_s: Window = ()
@@ -53,7 +53,7 @@ class QuantityTable:
     noise: Annotated[float, Range(1e-12)] | None = None
     """Standard deviation of its noise, its weight in fits. By default the channel is not used in fits."""
     offset: Annotated[float, Range(0.0)] | None = None
-    """Constant part of the tolerance; by default that of `activesteer compare`."""
+    """Constant part of the tolerance; by default the tolerance of `activesteer compare`."""
     gain: Annotated[float, Range(0.0)] | None = None
     """Fraction of the simulated value that is added to the tolerance."""
     source: str = ""
@@ -131,13 +131,13 @@ class MeasuredTable:
     overrides: dict[str, Any] = field(default_factory=dict)
     """Values of the car and the manoeuvre that are known better than in their files."""
     predict: PredictTable = PredictTable()
-    """What is free in the prediction."""
+    """Factors that are free in the prediction."""
     factors: dict[str, Any] = field(default_factory=dict)
     """Factors of the fit, with ranges as in a study."""
     intervals: dict[str, IntervalTable] = field(default_factory=dict)
     """Key -> ends of its unknown value, for the band around the prediction."""
     assumptions: tuple[str, ...] = ()
-    """What was assumed, one sentence each."""
+    """Assumptions, one sentence each."""
 
 
 @dataclass(frozen=True)

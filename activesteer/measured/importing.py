@@ -33,11 +33,11 @@ class ChannelMap:
     column: str
     """Name of the column."""
     unit: str = ""
-    """Unit of the column; by default that of the file, or SI."""
+    """Unit of the column; by default the unit of the file, or SI."""
     sign: Literal[1, -1] = 1
     """-1 if the sign of the column is opposite to ISO 8855 (or `axes`)."""
     factor: Annotated[float, Range(1e-12)] = 1.0
-    """Scale of the column, for a signal in a unit of its own: `factor` x column has the unit."""
+    """Scale of the column, for a signal in another unit: `factor` x column has the unit."""
     offset: float = 0.0
     """Offset added to the column, in its unit, before the scale."""
     zero_until_s: Annotated[float, Range(0.0)] | None = None
@@ -55,11 +55,11 @@ class MeasurementMap:
     time: str = ""
     """Name of the time column. Recognised by its name by default, as in further files without this column."""
     time_unit: str = ""
-    """Unit of the time; by default that of the file, or s."""
+    """Unit of the time; by default the unit of the file, or s."""
     shift_s: dict[str, float] = field(default_factory=dict)
     """File -> time to add to its clock, if several files have clocks of their own [s]."""
     step_s: Annotated[float, Range(1e-4, 1.0)] | None = None
-    """Step of the recording; that of the file by default."""
+    """Step of the recording; by default the step of the file."""
     max_gap_s: Annotated[float, Range(0.0)] = 0.1
     """Longest gap without samples that is bridged by a straight line."""
     start_s: float | None = None

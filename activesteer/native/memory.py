@@ -137,7 +137,7 @@ N_STEERING: Final = 6
 N_COMMAND: Final = len(numbers_of(ActuatorCommand))
 """Numbers of an `ActuatorCommand`."""
 N_HELD: Final = N_COMMAND + len(Estimate._fields) + 1
-"""Numbers of a decision: those of the command, of its estimate, and 1 if there is an estimate."""
+"""Numbers of a decision: the command, its estimate, and 1 if there is an estimate."""
 CALL: Final = (types.intp, types.intp, types.intp, types.intp)
 """Arguments of a law: addresses of its block, of the numbers of a `DriverCommand` and of a `Measurement`, and of the
 `N_HELD` numbers to write."""

@@ -120,7 +120,7 @@ Text = str | Markup
 _NARROW: Final = 3
 """Most columns that fit on a phone."""
 _LONG: Final = 60
-"""Length of a cell that needs a line of its own there."""
+"""Length of a cell that needs a separate line there."""
 _LONG_WORD: Final = 24
 """The same of a word."""
 _NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")

@@ -114,7 +114,7 @@ def _named(metadata: Mapping[str, Any], table: str, key: str) -> str:
 
 _ELSEWHERE: Final = "--web shows it in a browser, --save out.rrd writes a file for a viewer elsewhere"
 _HOST: Final = "127.0.0.1"
-"""Address of the web server: reachable from this machine alone."""
+"""Address of the web server: reachable only from this machine."""
 _PLAIN: Final = Showing()
 _FOOTER: Final = b"RRF2FOOT"
 _FOOTER_BYTES: Final = 64

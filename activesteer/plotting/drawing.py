@@ -56,7 +56,7 @@ def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterEr
 
 
 _BESIDE: Final = 3
-"""Most panels beside each other."""
+"""Largest number of panels next to each other."""
 _ROW_IN: Final = 2.7
 _NAME_IN: Final = 0.17
 """Height of a row of panels, and of a name of an ordinate [in]."""

@@ -169,7 +169,7 @@ _MISSING: Final = object()
 _READERS: Final[dict[str, Callable[[Mapping[str, Any]], Any]]] = {
     "maneuver": road_of, "course": course_of, "surface": surface_in, "car": footprint_of, "events": events_of,
 }  # fmt: skip
-"""Key of the metadata -> function that reads and checks what it holds."""
+"""Key of the metadata -> function that reads and checks its value."""
 
 
 def _count(count: int, most: int, what: str, **place: Any) -> None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""
 _MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
-"""Variables of a MATLAB file besides the channels."""
+"""Variables of a MATLAB file in addition to the channels."""
 
 
 class Recording:

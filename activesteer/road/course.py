@@ -188,7 +188,7 @@ class ProfileTable:
     left_z_m: tuple[float, ...]
     """Heights of the left track [m]."""
     right_z_m: tuple[float, ...] | None = None
-    """Heights of the right track [m]. Default: those of the left track."""
+    """Heights of the right track [m]. Default: the heights of the left track."""
     track_m: Annotated[float, Range(0.1, 10.0)] = 1.5
     """Distance of the two tracks [m]."""
 

@@ -116,7 +116,7 @@ def _ahead(path, x, y, around, window, ahead, starts, xs, ys, ends):
 
 
 _BESIDE_M: Final = 20.0
-"""Width of the road beside the path that the grid covers [m]. Places outside use the nearest cell."""
+"""Width of the road next to the path that the grid covers [m]. Places outside use the nearest cell."""
 _CELL_M: Final = 2.0
 _MAX_CELLS: Final = 65536
 """Largest number of cells. On a larger area the cells are larger [-]."""

@@ -152,7 +152,7 @@ class Road:
     """CSV file with the columns s_m and z_m, or s_m, left_z_m and right_z_m: a path, or a name in the manoeuvre's
     folder."""
     heights: ProfileTable | None = None
-    """Heights of two tracks over the distance. Default: those of the CSV."""
+    """Heights of two tracks over the distance. Default: the heights of the CSV."""
     roughness: Roughness | None = None
     """Random roughness of ISO 8608. Default: none."""
     crg: str | None = None

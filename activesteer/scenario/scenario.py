@@ -310,7 +310,7 @@ _FRICTION: Final = ("mu", "mu_left", "mu_right", "patches")
 _FIXED: Final = ("kind", "name", "title", "duration_s", "settle_s", "fault", "road")
 _CONTROL_UNIT: Final = ("interval_s", "bus_delay_s")
 _SAMPLES: Final = 200
-"""Instants at which the effect of a change on the rest of the manoeuvre is looked for."""
+"""Times at which the effect of a change on the rest of the manoeuvre is checked."""
 
 
 def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> tuple[str, Scenario]:

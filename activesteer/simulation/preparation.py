@@ -126,7 +126,7 @@ _STEADY_S: Final = 0.5
 _CHUNK_S: Final = 0.25
 """Interval between two checks of whether a ramp has reached its end [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
-"""FMVSS 126 rounds A to 0.1 deg, which also makes A the same on every machine."""
+"""FMVSS 126 rounds A to 0.1 deg, so that A is the same on every machine."""
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:

@@ -53,7 +53,7 @@ def stop(runner: StandardRunner) -> Findings:
 
 
 AFTER_S: Final = 1.0
-"""Time after the beginning of braking at which the car is evaluated [s]."""
+"""Time after the start of braking at which the car is evaluated [s]."""
 HIGH, LOW = 0.9, 0.3
 """Friction of the two sides, relative to the tyre file."""
 _SPLIT_CASES: Final = {
@@ -108,7 +108,7 @@ _SHOWN: Final = (
 _TURN_CHANNELS: Final = ("yaw_rate_radps", "sideslip_rad", "speed_mps")
 _TURN_BRAKE_S: Final = 6.0
 _AFTER_S: Final = 2.2
-"""Duration after the beginning of braking [s]. It ends before the car stops, where sideslip is undefined."""
+"""Duration after the start of braking [s]. It ends before the car stops, where sideslip is undefined."""
 
 
 def in_a_turn(runner: StandardRunner) -> Findings:

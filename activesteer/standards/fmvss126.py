@@ -29,7 +29,7 @@ HEAVY_KG: Final = 3500.0
 RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
 _METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 _BEGIN_S: Final = 1.5
-"""Beginning of the sine [s]. The signals are zeroed over the second before."""
+"""Start of the sine [s]. The signals are zeroed over the second before."""
 _SINE: Final = {"steer.start_s": _BEGIN_S, "duration_s": 5.6}
 _RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
 

@@ -261,7 +261,7 @@ _WINDOW_S: Final = 2.0
 """Evaluated time after it [s]."""
 _SPACING_M: Final = 1.0
 OFFSET_AT_S: Final = 1.0
-"""Time after the beginning of a fault at which the lateral offset is taken [s]."""
+"""Time after the start of a fault at which the lateral offset is taken [s]."""
 _RESOLUTION_S: Final = 0.005
 """Resolution of the fault-tolerant time [s]."""
 _ALL_KINDS: Final = (

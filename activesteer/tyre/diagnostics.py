@@ -26,14 +26,14 @@ RELAXATION_RANGE_M: Final = (0.1, 1.5)
 STRAIGHT_AHEAD_FRACTION: Final = 0.05
 """Lateral force straight ahead, over the load, from which a car on four such tyres clearly pulls."""
 NOMINAL_LOAD_N: Final = (1000.0, 12_000.0)
-"""Nominal loads of car tyres; those of motorcycles and trucks lie outside."""
+"""Nominal loads of car tyres; loads of motorcycles and trucks are outside."""
 STATIC_DEFLECTION: Final = (0.03, 0.15)
 """Deflection under the nominal load, over the free radius."""
 _BOOKKEEPING: Final = (
     "N_TIRE_STATES", "USER_SUB_ID", "USE_MODE", "ROAD_INCREMENT", "ROAD_DIRECTION", "HMAX_LOCAL", "TIME_SWITCH_INTEG",
     "SWITCH_INTEG", "FE_METHOD", "FUNCTION_NAME", "FILE_VERSION",
 )  # fmt: skip
-"""Keys that control another program and say nothing about the tyre."""
+"""Keys that control another program and do not describe the tyre."""
 _SECTIONS: Final = {
     "LONGITUDINAL_COEFFICIENTS": (("RBX1", "RCX1"), "combined slip does not reduce the longitudinal force"),
     "LATERAL_COEFFICIENTS": (("RBY1", "RCY1"), "combined slip does not reduce the lateral force"),

@@ -158,7 +158,7 @@ def describe(params: TyreParameters) -> str:
 
 
 _COLOURS: Final = ("#0072b2", "#009e73", "#e69f00", "#d55e00", "#cc79a7", "#333333", "#56b4e9")
-"""Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
+"""Colours that colour-blind readers can distinguish (Okabe and Ito, 2008)."""
 _LOAD_FRACTIONS: Final = (0.5, 1.0, 1.5, 2.0)
 _DEGREES: Final = math.degrees(1.0)
 _WIDEST_ANGLE_RAD: Final = math.radians(20.0)

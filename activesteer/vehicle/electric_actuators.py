@@ -177,7 +177,7 @@ class Battery:
     charge_power_W: _NotNegative | None = None
     """Largest power that it takes from regeneration [W]. Default no limit."""
     auxiliary_power_W: _NotNegative = 0.0
-    """Power of all consumers beside the motors [W]."""
+    """Power of all consumers except the motors [W]."""
 
 
 MOTOR: Final = numbers_type(
@@ -393,7 +393,7 @@ class RearActuator(ElectricActuator):
 
 NAME: Final = "superposition"
 SPEED_STATE: Final = "_motor"
-"""Suffix of the state beside an actuator that is the speed of its motor, and of its sensor."""
+"""Suffix of the additional state of an actuator that is the speed of its motor, and of its sensor."""
 _COLUMN: Final = "steering_column"
 
 

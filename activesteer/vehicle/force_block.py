@@ -34,7 +34,7 @@ _WORD_BYTES: Final = 8
 _MODEL_BYTES: Final = 8192
 """Bytes of mjModel to search: its members are sizes, options and pointers, a few kilobytes."""
 _DATA_BYTES: Final = 262_144
-"""Bytes of mjData to search: solver statistics lie before the pointers (160 KB in MuJoCo 4.0)."""
+"""Bytes of mjData to search: solver statistics are before the pointers (160 KB in MuJoCo 4.0)."""
 
 
 class EngineLayout(NamedTuple):
@@ -265,7 +265,7 @@ WHEEL_OUTPUT: Final = numbers_type(
     "deflection_x_rate_mps", "deflection_y_rate_mps", "deflection_z_rate_radps", "loaded_radius_m", "limited",
     "friction_utilisation", "mu", "contact_x_m", "contact_y_m", "road_z_m", "road_slope_x", "road_slope_y",
 )  # fmt: skip
-"""Outputs of the callback for each wheel, at the beginning of mjData.userdata. After them come the force of each damper
+"""Outputs of the callback for each wheel, at the start of mjData.userdata. After them come the force of each damper
 and the readings of screws and motors, and last, not written by the callback, the number of active faults."""
 USERDATA_PER_WHEEL: Final = WHEEL_OUTPUT.itemsize // 8
 

@@ -193,7 +193,7 @@ class Load:
     fuel_position_m: Position | None = None
     """Position of the tank, vehicle axes [m]; default 0.4 m ahead of the rear axle, 0.35 m high."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
-    """Upward shift of the empty car's centre of gravity [m], by moving that of the chassis."""
+    """Upward shift of the empty car's centre of gravity [m], by moving the chassis's centre of gravity."""
     cg_forward_change_m: Annotated[float, Range(-0.5, 0.5)] = 0.0
     """Forward shift of it [m]."""
 

@@ -129,7 +129,7 @@ _DRAWN: Final = {
     "spring_inner": (0.0, -0.16, 0.45), "spring_outer": (0.0, -0.12, 0.05), "damper_inner": (-0.06, -0.16, 0.5),
     "damper_outer": (-0.06, -0.12, 0.0), "tie_rod_inner": (-0.13, -0.4, -0.04),
 }  # fmt: skip
-"""Points from the wheel centre for the drawing of an axle of curves, which has no points of its own [m]."""
+"""Points from the wheel centre for the drawing of an axle of curves, which has no points [m]."""
 
 
 def complete(

@@ -64,7 +64,7 @@ class Statement:
     text: str
     """Its words."""
     criterion: str
-    """Condition for it to pass, besides the conditions of all statements (`obstacle_of`)."""
+    """Condition for it to pass, in addition to the conditions of all statements (`obstacle_of`)."""
     values: dict[str, tuple[str, ...]]
     """Values to show: names of systems -> names of metrics."""
     conditions: tuple[str, ...]
@@ -223,7 +223,7 @@ COMMON_DELAYS: Final = {"yaw_rate_delay_s": ("yaw_rate", "radps"), "ay_delay_s":
 TURNED: Final = (("rear_steer", "rad"), ("superposition", "rad"), ("sideslip", "rad"))
 """Settled angles that count from straight ahead, where the offset of a sensor also turns wheels."""
 ADDED: Final = ("rear_steer_steady_state_rad", "superposition_steady_state_rad")
-"""Angles that count without the give of the hinges, which the car without control has too."""
+"""Angles that count without the compliance of the hinges, which the car without control has too."""
 
 
 def _step_metrics(recording: RecordingLike) -> dict[str, float]:

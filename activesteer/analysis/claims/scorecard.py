@@ -61,7 +61,7 @@ class Setting:
     """A setting of car, driver and manoeuvres, as read from its file."""
 
     title: str = ""
-    """One line for people."""
+    """Title in one line."""
     numbers: tuple[Number, ...] = ()
     """Everything that differs from the nominal car, driver and manoeuvre."""
     fails: dict[str, str] = field(default_factory=dict)

@@ -169,7 +169,7 @@ BY_KIND: Final[dict[str, Draw]] = {
     "slalom": tracks.overview,
     "follow_path": tracks.overview,
 }
-"""Kind of manoeuvre -> function that draws it at a glance. Other kinds are drawn by `over_time.time_figure`."""
+"""Kind of manoeuvre -> function that draws an overview. Other kinds are drawn by `over_time.time_figure`."""
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:

@@ -44,7 +44,7 @@ FRONT_LABEL: Final = "added in front"
 PATCH_COLOUR: Final = "#c3d9ec"
 """Colour of a place with another friction."""
 MAX_POINTS: Final = 5000
-"""Most samples of a curve: a picture cannot show more, and its file would be large."""
+"""Largest number of samples of a curve: a plot cannot show more, and its file would be large."""
 
 
 class DrawnRun(NamedTuple):
@@ -155,7 +155,7 @@ def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, Li
 
 
 _SETTLING: Final = ("yaw_rate", "sideslip", "speed")
-"""Panels whose signals tell when a transient is over."""
+"""Panels whose signals show the end of a transient."""
 PANEL_IN: Final = 1.05
 """Height of a panel over time [in]."""
 _INSET_FROM: Final = 2.0
@@ -170,11 +170,11 @@ _SAME_BORDER: Final = 0.002
 """Largest distance between borders of runs that share a line, as a fraction of the time shown."""
 _SAME_FRICTION: Final = 1e-3
 _AFTER_MARK: Final = 0.12
-"""Time shown after the last instant of a criterion, as a fraction of the time before it."""
+"""Time shown after the last time of a criterion, as a fraction of the time before it."""
 _LETTER_IN: Final = 0.066
 """Mean width of a letter of 8 pt, with some room [in]."""
 _SIDES_IN: Final = 0.6
-"""Width of the labels beside the axes [in]."""
+"""Width of the labels next to the axes [in]."""
 _BEFORE: Final = 0.08
 _AFTER: Final = 0.2
 """Time shown before and after the transient, as fractions of its duration."""

@@ -28,9 +28,9 @@ MAX_SAMPLES: Final = 4000
 MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
-"""Distance beside the course to which the picture shows a car that leaves it [m]."""
+"""Distance from the course up to which the plot shows a car that leaves it [m]."""
 BESIDE_M: Final = 15.0
-"""Distance beside the tracks to which places of another friction are drawn [m]."""
+"""Distance from the tracks up to which areas of a different friction are drawn [m]."""
 DIGITS: Final = 4
 """Digits after the first digit of a signal's range. More cannot be seen."""
 

@@ -43,7 +43,7 @@ _CHANGE_MARK: Final = {
     Change.SAME: "\N{ALMOST EQUAL TO}",
     Change.OTHER: "",
 }
-"""Marks beside the colours, for readers who cannot see these."""
+"""Marks in addition to the colours, for readers who cannot see the colours."""
 _MOST_EVENTS: Final = 20
 
 
@@ -307,7 +307,7 @@ def _text(key: str, value: Any) -> str:
 
 
 MAX_FIGURES: Final = 6
-"""Most key figures that can be read at a glance."""
+"""Largest number of key figures that can be read quickly."""
 
 
 HEADLINE: Final = "Peak sideslip [deg]"

@@ -55,7 +55,7 @@ _STATE: Final = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SETTLING_S: Final = 3.0
 """Time in which a car with changed parameters settles [s]."""
 _KEPT: Final = ("electric_state", "sensor_memory")
-"""Parts of the memory that change in a step, beside the arrays of a recorded row."""
+"""Parts of the memory that change in a step, in addition to the arrays of a recorded row."""
 _OPTIONS: Final = (
     "-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-march=x86-64-v3", "-Wall",
     "-Wno-unused-parameter",

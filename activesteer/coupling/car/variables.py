@@ -24,7 +24,7 @@ from activesteer.vehicle.step_bindings import CARRIED_OUT, COMMANDS
 
 INPUT, OUTPUT, PARAMETER = "input", "output", "parameter"
 FROM_RESULT, FROM_FORCE, FROM_LIMIT, FROM_MOTION, FROM_INPUT = range(17, 22)
-"""Sources of a value beside the arrays of `RawRows`, whose places are 0 to 15; as in car.c."""
+"""Sources of a value in addition to the arrays of `RawRows`, whose places are 0 to 15; as in car.c."""
 _MAX_TORQUE_NM: Final = 1e5
 _MAX_PRESSURE_PA: Final = 1e8
 MOTION: Final = (

@@ -27,7 +27,7 @@ from activesteer.plugins.file import parse_parameters
 from activesteer.plugins.plugin import allowed, read_values
 
 _NO_SIGNAL: Final = "none"
-"""Signal of a map for a variable that is left alone."""
+"""Signal of a map for a variable that is not used."""
 _KEYS: Final = ("signal", "unit")
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LEFT, _RIGHT, _THIRD, _GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
-"""Colours that colour-blind readers can tell apart (Okabe and Ito, 2008)."""
+"""Colours that colour-blind readers can distinguish (Okabe and Ito, 2008)."""
 _DASHES: Final = (0.0, (4.0, 3.0))
 _DEG: Final = math.degrees(1.0)
 _AXLES: Final = (("front axle", 0), ("rear axle", 2))
@@ -184,7 +184,7 @@ _GRIDS: Final = {
         "moment on each wheel [Nm]", 1.0,
     ),
 }  # fmt: skip
-"""Name of a picture -> its content."""
+"""Name of a figure -> its content."""
 
 
 def _drawn_grid(result: KcResult, grid: Grid) -> Picture:

@@ -18,7 +18,7 @@ from activesteer.errors import ParameterError, StudyError, not_installed, shown
 from activesteer.studies.engine.factors import Factor, Value
 
 FOR_INDICES: Final = ("saltelli", "morris")
-"""Designs that SALib makes for its sensitivity indices. Every factor must be sampled."""
+"""Designs that SALib creates for its sensitivity indices. Every factor must be sampled."""
 MORRIS_LEVELS: Final = 4
 MAX_SAMPLES: Final = 10_000_000
 """Largest number of combinations of a design."""

@@ -240,9 +240,9 @@ def _name(item: Any) -> str:
 _ERROR_CHARACTERS: Final = 500
 """Largest length of an error message in a row."""
 CLAIM: Final = "claim_"
-"""Prefix of the columns that say whether a claim holds for the sample."""
+"""Prefix of the columns with the verdict of a claim for the sample."""
 DISTANCE: Final = "distance_"
-"""Prefix of the columns that say how far a claim is from holding (see `Claim.distance`)."""
+"""Prefix of the columns with the distance of a claim from passing (see `Claim.distance`)."""
 CURVE: Final = "curve_"
 """Prefix of the columns that hold a channel over time."""
 
@@ -252,7 +252,7 @@ class Status(StrEnum):
 
     OK = "ok"
     UNEVALUATED = "unevaluated"
-    """The run is complete but has no metrics. `error` says why."""
+    """The run is complete but has no metrics. `error` gives the reason."""
     FAILED = "failed"
     """The run could not start, or ended early."""
     CRASHED = "crashed"

@@ -28,7 +28,7 @@ TABLE: Final = "tune"
 _MOST: Final = 1e6
 """Bound of a margin in a search, for runs that define no metric."""
 _ROOM: Final = 0.1
-"""Margin above which a statement that holds costs nothing."""
+"""Margin above which a statement that holds has no cost."""
 _IMPLAUSIBLE: Final = 0.3
 """Cost of a setting at the ends of its ranges. A statement that fails costs 1 to 2."""
 

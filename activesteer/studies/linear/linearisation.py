@@ -414,7 +414,7 @@ DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 """Damping ratios drawn as rays into a root locus."""
 
 _LONGEST_STEP_1PS: Final = 12.0
-"""Longest way of a pole from one speed to the next [1/s]."""
+"""Longest distance of a pole from one speed to the next [1/s]."""
 _GREY: Final = "#cccccc"
 _GAIN_UNITS: Final = {
     "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",

@@ -337,7 +337,7 @@ def _answer_to_samples(
 
 
 _SHOWN: Final = (-3.2, 1.6), (-2.4, 2.4)
-"""Range of the real and of the imaginary part in a picture."""
+"""Range of the real and of the imaginary part in a plot."""
 _LEAD: Final = (
     "Each curve is the loop gain L over frequency, from 0.008 to 48 Hz, with its mirror image left out. The loop is "
     "marginal where L = \N{MINUS SIGN}1 (cross). The red disk has the smallest disk margin alpha of all speeds: the "

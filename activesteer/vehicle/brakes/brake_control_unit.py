@@ -52,7 +52,7 @@ def flow(setup, state, pedal):
 _SLACK_mps2: Final = 0.2
 """Additional deceleration of the estimate, so that the fastest wheel corrects it upwards [m/s2]."""
 _CATCH_UP_mps2: Final = 2.0
-"""Largest rate of that correction; a wheel that swings on its suspension is for an instant faster than the car [m/s2].
+"""Largest rate of that correction; a wheel that swings on its suspension is briefly faster than the car [m/s2].
 """
 _LEARN_S: Final = 0.5
 """Time constant of the learned offset of the acceleration [s]."""

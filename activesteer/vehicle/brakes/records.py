@@ -48,7 +48,7 @@ class Antilock:
     select_low: bool = True
     """Whether both rear wheels get the pressure of the wheel with less grip."""
     hold_speed_mps: Annotated[float, Range(0.5, 20.0)] = 5.0
-    """Speed below which pressures are held and slip alone releases a wheel [m/s]; a tyre of 0.4 m relaxation length
+    """Speed below which pressures are held and only slip releases a wheel [m/s]; a tyre of 0.4 m relaxation length
     then takes more than 0.08 s to build up its force."""
     hold_slip_mps: NotNegative = 0.3
     """Speed difference added to the largest slip there, by which the estimated speed may be off [m/s]."""
@@ -109,7 +109,7 @@ class TractionControl:
     engine_integral_gain_Nmpm: NotNegative = 1500.0
     """Integral reduction of the drive torque per excess speed and second [Nm/m]."""
     brake_gain_Paspm: NotNegative = 1.5e6
-    """Pressure at a driven wheel per speed above that of its axle's other wheel [Pa/(m/s)]."""
+    """Pressure at a driven wheel per speed above the speed of its axle's other wheel [Pa/(m/s)]."""
     brake_limit_Pa: NotNegative = 6e6
     """Highest pressure of that kind [Pa]."""
 
@@ -133,7 +133,7 @@ class Brakes:
     control_interval_s: Annotated[float, Range(0.001, 0.02)] = 0.005
     """Interval of the decisions of anti-lock and traction control [s]."""
     abs: bool = True
-    """Whether the anti-lock system is on; it does nothing while no wheel is close to locking."""
+    """Whether the anti-lock system is on; it is inactive while no wheel is close to locking."""
     tcs: bool = False
     """Whether traction control is on."""
     antilock: Antilock = Antilock()
