@@ -55,8 +55,8 @@ def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Arra
     if places.min() <= HALF_BAND_LINES or places.max() + HALF_BAND_LINES >= len(lines_Hz):
         low, high = float(frequency_Hz.min()), float(frequency_Hz.max())
         raise RecordingError(
-            f"a run of {count * step_s:.3g} s holds no response from {low:.3g} to {high:.3g} Hz; "
-            f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, and {HALF_BAND_LINES + 1} lines at each end fall away",
+            f"a run of {count * step_s:.3g} s has no response from {low:.3g} to {high:.3g} Hz; "
+            f"its spectrum ends at {lines_Hz[-1]:.3g} Hz, without {HALF_BAND_LINES + 1} lines at each end",
             value=(low, high),
         )
     band = places[:, None] + np.arange(-HALF_BAND_LINES, HALF_BAND_LINES + 1)

@@ -136,7 +136,7 @@ class Expression:
             words = [word.id if isinstance(word, ast.Name) else getattr(word, "value", None) for word in node.args]
             if len(words) in (1, 2) and all(isinstance(word, str) for word in words):
                 return self._metric(name, *map(str, words))
-        raise self._fail(f"{ast.unparse(node)} is no number, metric(controller), sum, product, min, max or abs")
+        raise self._fail(f"{ast.unparse(node)} is not a number, metric(controller), sum, product, min, max or abs")
 
     def _metric(self, name: str, controller: str, maneuver: str = "") -> _Number:
         names = self._names
@@ -150,7 +150,7 @@ class Expression:
             controller = names.examined
         if names.controllers is not None and controller not in names.controllers:
             raise self._fail(
-                f"{controller} is no controller of the runs; {nearest_names(controller, names.controllers)};"
+                f"{controller} is not a controller of the runs; {nearest_names(controller, names.controllers)};"
             )
         if not maneuver and len(names.maneuvers) == 1:
             maneuver = names.maneuvers[0]

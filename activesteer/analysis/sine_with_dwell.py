@@ -174,7 +174,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
     below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)
     if below.size == 0:
         raise RecordingError(
-            f"the sine with dwell is not completed: the steering wheel still stands at "
+            f"the sine with dwell is not completed: the steering wheel is still at "
             f"{math.degrees(abs(float(angle[-1]))):.3g} deg when the run ends",
             value=abs(float(angle[-1])),
         )

@@ -86,7 +86,7 @@ def _step_time(time_s: Array, steering_rad: Array) -> float:
     step_time_s = crossing_time(time_s, math.copysign(1.0, final_rad) * steering_rad, 0.5 * abs(final_rad))
     if math.isnan(step_time_s):
         raise RecordingError(
-            f"the step steer has no beginning: the steering wheel stands at {math.degrees(steering_rad[0]):.3g} deg "
+            f"the step steer has no start: the steering wheel is at {math.degrees(steering_rad[0]):.3g} deg "
             f"from the first sample on and ends at {math.degrees(final_rad):.3g} deg",
             value=float(steering_rad[0]),
         )

@@ -212,7 +212,7 @@ def numbers(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no list of numbers such as 60,100") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of numbers such as 60,100") from None
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:

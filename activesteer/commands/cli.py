@@ -66,7 +66,7 @@ def _called(arguments: Sequence[str] | None, stop: StopSignals) -> int:
     except SystemExit as end:  # not the parser's: code of the user wants to end the program
         from activesteer.plugins import in_one_line
 
-        print(f"activesteer: code of your own ended the program: {in_one_line(end)}", file=sys.stderr)
+        print(f"activesteer: your code ended the program: {in_one_line(end)}", file=sys.stderr)
         return 1
 
 

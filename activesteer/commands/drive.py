@@ -250,7 +250,7 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
         raise ParameterError(f"-c {' -c '.join(names)}: controller names must be unique; two have the same name")
     if output.suffix == ".mcap":
         if len(controllers) > 1:
-            raise ParameterError(f"-o {output}: one file for {len(controllers)} controllers; give a folder")
+            raise ParameterError(f"-o {output}: {len(controllers)} controllers need a folder, not one file")
         folder, paths = output.parent, [output]
     elif output.suffix in _OTHER_FILES and not output.is_dir():
         raise ParameterError(f"-o {output}: a recording ends in .mcap; any other name is a folder", value=output)
@@ -312,7 +312,7 @@ def _explore(options: argparse.Namespace) -> None:
     if not 0 <= port <= 65535:
         raise ParameterError(f"--port: is {port}, must be 0 to 65535")
     if not Path(options.output).is_dir():
-        raise ParameterError(f"-o: {options.output} is no folder; the page reads and writes files there")
+        raise ParameterError(f"-o: {options.output} is not a folder; the page reads and writes files there")
     try:
         from activesteer.explore.server import ExploreServer
     except ModuleNotFoundError as error:

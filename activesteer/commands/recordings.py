@@ -207,7 +207,7 @@ def _replay(options: argparse.Namespace) -> None:
     from activesteer.analysis.report.groups import verdict
 
     if options.compare and len(options.files) < 2:
-        raise ParameterError(f"--compare needs at least two files, and {options.files[0]} is one")
+        raise ParameterError(f"--compare needs at least two files; only {options.files[0]} is given")
     named = _named(options.files)
     runs, how = runs_of(named), Showing(options.compare, options.cutaway, tuple(verdict(named)))
     if options.output is not None:
@@ -231,7 +231,7 @@ def _size(text: str) -> tuple[int, int]:
     """Parse the size of a film, such as `1280x720`."""
     found = re.fullmatch(r"(\d{1,6})[x*](\d{1,6})", text.strip().lower())
     if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size such as 1280x720")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1280x720")
     return int(found[1]), int(found[2])
 
 
@@ -256,7 +256,7 @@ def _video(options: argparse.Namespace) -> None:
     from activesteer.video import Settings, make_film
 
     if options.corner and options.camera != "wheel":
-        raise ParameterError("belongs to --camera wheel", key="--corner", value=options.corner)
+        raise ParameterError("has an effect only with --camera wheel", key="--corner", value=options.corner)
     if options.layout == "side-by-side" and not options.compare:
         raise ParameterError("--layout side-by-side needs --compare OTHER.mcap")
     named = _named([options.file, *(options.compare or ())])

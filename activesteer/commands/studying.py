@@ -76,7 +76,7 @@ def _study(options: argparse.Namespace) -> bool:
     if changes and given.is_dir():
         raise StudyError(f"{given} holds a study, which keeps its {' and '.join(changes)}; give a study file instead")
     if changes and (options.status or options.report):
-        raise StudyError(f"--status and --report drive nothing, so they take no {' and '.join(changes)}")
+        raise StudyError(f"--status and --report drive no runs, so they do not accept {' and '.join(changes)}")
     folder = options.output or (given if given.is_dir() else None)
     if folder is None:
         read_study(options.study)

@@ -130,7 +130,7 @@ def read_toml(path: Path, error: type[ActiveSteerError] = ParameterError) -> tup
     try:
         return _parsed(text), Source(path.name, text, error)
     except ValueError as reason:
-        raise error(f"no valid TOML: {reason}", file=path.name) from reason
+        raise error(f"invalid TOML: {reason}", file=path.name) from reason
 
 
 def _parsed(text: str) -> dict[str, Any]:
@@ -284,7 +284,7 @@ def merged(
     """Return a table with one key replaced, in any of its units."""
     where = (*above, path[0])
     if not isinstance(table, Mapping):
-        raise source.fail(above, f"is {shown(table)}, which is no table and has no {path[0]}", table)
+        raise source.fail(above, f"is {shown(table)}, which is not a table and has no {path[0]}", table)
     hints, fields = hints_of(cls), fields_of(cls)
     key, rest = path[0], path[1:]
     name, _ = field_in_unit(key, fields)
@@ -312,7 +312,7 @@ def _merged_list(
 ) -> list[Any]:
     """Return a list of tables with one table, or a key of it, replaced."""
     if not isinstance(given, (list, tuple)):
-        raise source.fail(where, f"is {shown(given)}, which is no list", given)
+        raise source.fail(where, f"is {shown(given)}, which is not a list", given)
     elements = list(given)
     numbers = [str(number) for number in range(len(elements))]
     if rest[0] not in numbers:
@@ -341,7 +341,7 @@ def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: 
             values |= {field_in_unit(key, fields)[0]: value for key, value in within.items()}
             if rule := _overruling(owner, path[-1], values):
                 by = " and ".join(f"{other} = {shown(values[other])}" for other in rule)
-                raise source.fail(path, f"has no effect beside {by}; leave one out", within.get(path[-1]))
+                raise source.fail(path, f"has no effect together with {by}; leave one out", within.get(path[-1]))
 
 
 def is_overruled(owner: Any, key: str) -> bool:
@@ -411,11 +411,11 @@ def convert(hint: Any, raw: Any, factor: float, source: Source, path: Sequence[s
     origin = typing.get_origin(hint)
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         if not isinstance(raw, Mapping):
-            raise source.fail(path, f"{shown(raw)} is no table; a table [{'.'.join(path)}] is needed", raw)
+            raise source.fail(path, f"{shown(raw)} is not a table; a table [{'.'.join(path)}] is needed", raw)
         return build(hint, raw, source, path, base)
     if origin is dict:
         if not isinstance(raw, Mapping):
-            raise source.fail(path, f"{shown(raw)} is no table", raw)
+            raise source.fail(path, f"{shown(raw)} is not a table", raw)
         item = typing.get_args(hint)[1]
         return {key: convert(item, value, 1.0, source, (*path, str(key))) for key, value in raw.items()}
     if origin is tuple:
@@ -487,7 +487,7 @@ def check_points(
             raise error(f"does not increase from {before:g} to {after:g}", key=key)
     for name, column in columns.items():
         if column is not None and len(column) != len(points):
-            raise error(f"has {len(column)} values beside {len(points)} of {key}", key=name)
+            raise error(f"has {len(column)} values, but {key} has {len(points)}", key=name)
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:

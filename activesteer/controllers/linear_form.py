@@ -160,11 +160,11 @@ def pulse_responses(
             largest = np.abs(whole).max()
             if np.abs(whole - half).max() > _NONLINEARITY * largest:
                 raise ControllerError(
-                    f"does not answer {signal} in proportion and has no linear form", key=name, value=signal
+                    f"does not respond to {signal} in proportion, so it has no linear form", key=name, value=signal
                 )
             if np.abs(whole[-count // 10 :]).max() > _LEFT * largest:
                 raise ControllerError(
-                    f"still answers a pulse of {signal} after {_LENGTH_S:g} s", key=name, value=signal
+                    f"still responds to a pulse of {signal} after {_LENGTH_S:g} s", key=name, value=signal
                 )
             result[:, :, column] += whole / len(starts)
     return result

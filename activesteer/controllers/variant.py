@@ -107,7 +107,9 @@ def read_variant(given: str | os.PathLike[str]) -> Variant:
         raise source.fail(("system",), problem, known.system, list(CONTROLLERS))
     gains = {key: value for key, value in table.items() if key not in _OWN_KEYS}
     if not gains:
-        raise source.fail((), f"nothing differs from {known.system}; give gains, as [{known.system}] limit_deg = 2")
+        raise source.fail(
+            (), f"no gain differs from {known.system}; give gains, such as [{known.system}] limit_deg = 2"
+        )
     if path == models_dir() / "controllers" / f"{known.system}.toml":
         gains = {}
     return Variant(known.name, known.title, known.system, gains, source)

@@ -75,7 +75,7 @@ class Child:
         self._socket.sendall(_LENGTH.pack(len(request)) + request)
         (length,) = _LENGTH.unpack(self._received(_LENGTH.size, end_s))
         if length > max_bytes:
-            raise ChildFault(f"answers with {length} bytes, of which at most {max_bytes} are allowed")
+            raise ChildFault(f"answers with {length} bytes; at most {max_bytes} are allowed")
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:

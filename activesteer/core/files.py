@@ -167,7 +167,7 @@ def read_text(
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:
         raise error(
-            f"cannot read {shown_path(path)}: it is no UTF-8 text (byte {reason.start})", value=path
+            f"cannot read {shown_path(path)}: it is not UTF-8 text (byte {reason.start})", value=path
         ) from reason
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
@@ -200,7 +200,7 @@ def read_csv(
             if any(cells) or (empty_cells_count and len(cells) > 1):
                 rows.append(CsvRow(reader.line_num, cells))
     except csv.Error as reason:
-        raise error(f"no valid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason
+        raise error(f"invalid CSV: {reason}", file=Path(path).name, line=reader.line_num) from reason
     return rows
 
 
@@ -215,7 +215,7 @@ def make_folder(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> 
 @contextmanager
 def _refused(doing: str, path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[None]:
     if "\0" in os.fspath(path):
-        raise error(f"cannot {doing} {shown_path(path)}: a path has no zero byte", value=path)
+        raise error(f"cannot {doing} {shown_path(path)}: a path cannot contain a zero byte", value=path)
     try:
         yield
     except OSError as reason:

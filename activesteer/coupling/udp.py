@@ -135,7 +135,7 @@ class UdpLink:
             self.report["timeouts"] += 1
             if self.port.reaction == "stop":
                 problem = f"no command for {self.port.timeout_s:g} s on port {self.address[1]}"
-                raise ManeuverError(f"{problem}; the run ends, as the reaction 'stop' asks for", key="udp")
+                raise ManeuverError(f"{problem}; the run ends, because the reaction is 'stop'", key="udp")
             if self.port.reaction == "release":
                 self._now = _NOTHING
         return self._now

@@ -87,7 +87,7 @@ _DECODER: Final = msgspec.json.Decoder(Message)
 def read(text: str | bytes) -> Message:
     """Return a message of the page."""
     if len(text) > MAX_MESSAGE_BYTES:
-        raise ParameterError(f"a message of the page has {len(text)} letters; {MAX_MESSAGE_BYTES} are allowed")
+        raise ParameterError(f"a message of the page has {len(text)} characters; allowed are {MAX_MESSAGE_BYTES}")
     try:
         return _DECODER.decode(text)
     except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:

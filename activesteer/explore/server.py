@@ -61,7 +61,7 @@ class ExploreServer:
         except OSError as error:
             self._socket.close()
             raise ActiveSteerError(
-                f"port {port} cannot be opened ({error.strerror}); --port 0 takes a free one"
+                f"port {port} cannot be opened ({error.strerror}); --port 0 selects a free port"
             ) from error
         self._socket.listen()
         self._token = secrets.token_urlsafe(16)

@@ -144,7 +144,7 @@ def _known(options: dict[str, Any]) -> dict[str, Any]:
     names = [name for name in signature(Episodes).parameters if name not in ("task", "n")]
     for name in options:
         if name not in names:
-            raise ParameterError(f"is no option; {nearest_names(name, names)}", key=name, allowed=names)
+            raise ParameterError(f"is not an option; {nearest_names(name, names)}", key=name, allowed=names)
     return options
 
 

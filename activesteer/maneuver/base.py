@@ -231,7 +231,7 @@ def _crg(file: Path) -> dict[str, Any]:
             (path for path in (place.parent / other, place.parent / PurePosixPath(other).name) if is_file(path)), None
         )
         if found is None:
-            raise ManeuverError(f"refers to {shown(other)}, which is not found beside it", file=name)
+            raise ManeuverError(f"refers to {shown(other)}, which is not found next to it", file=name)
         name, place = other, found
         files[name] = read_bytes(found, ManeuverError, limits.MAX_CRG_BYTES)
     raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain", file=file.name)

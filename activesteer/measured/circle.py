@@ -99,7 +99,7 @@ def validate_circle(
     """Drive a car on the circle on which it was measured."""
     if samples < 10:
         raise ParameterError(
-            f"{samples} samples make no distribution; at least 10 are needed", key="samples", value=samples
+            f"{samples} samples are too few for a distribution; at least 10 are needed", key="samples", value=samples
         )
     circle, intervals = file.table.circle, file.table.intervals
     assert circle is not None

@@ -57,7 +57,7 @@ def understood(path: Path, what: str) -> Iterator[None]:
         raise
     except Exception as reason:
         problem = str(reason) or type(reason).__name__
-        raise RecordingError(f"{shown_path(path)} is no readable {what}: {problem}", value=path) from reason
+        raise RecordingError(f"{shown_path(path)} is not a readable {what}: {problem}", value=path) from reason
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:
@@ -110,7 +110,7 @@ def csv_columns(path: Path) -> list[Column]:
         times_s = _clock_s(texts)
         if times_s is None:
             text = next((text for text in texts if text and not _NUMBER.fullmatch(text.strip())), "")
-            problem = f"{shown(text)} is no number" if text else "decimal points and commas are mixed"
+            problem = f"{shown(text)} is not a number" if text else "decimal points and commas are mixed"
             raise RecordingError(f"column {shown(name)} holds no numbers: {problem}", file=path.name)
         return times_s, None
 
@@ -176,7 +176,7 @@ def _header(head: list[str], separator: str, count: int, path: Path) -> tuple[li
     wrong = len(rows[-1]) if rows and any(rows[-1][count:]) else names[-1] if names and not rows else 0
     if wrong:
         raise RecordingError(
-            f"names {wrong} columns and has {count}; decimal commas need another separator", file=path.name
+            f"names {wrong} columns but has {count}; decimal commas need another separator", file=path.name
         )
     if not rows:
         raise RecordingError("has no line with the names of its columns above the numbers", file=path.name, line=1)

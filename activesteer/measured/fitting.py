@@ -65,14 +65,14 @@ def read_fit(given: FileOrTable) -> tuple[StudyFile, FitTable]:
             raise fail((key,), f"a fit needs exactly one, not {len(getattr(study, key))}")
     for maneuver in study.maneuvers:
         if not is_recording(maneuver):
-            raise fail(("maneuvers",), f"{maneuver!r} is no recording (.mcap) with inputs to drive", maneuver)
+            raise fail(("maneuvers",), f"{maneuver!r} is not a recording (.mcap) with inputs to drive", maneuver)
     for factor in study.factors:
         if factor.kind != "uniform":
             raise fail(("factors", factor.key, factor.kind), "a fit needs a range: uniform = [low, high]")
     ranges = {factor.key: Range(factor.low, factor.high) for factor in study.factors}
     for key, value in table.start.items():
         if key not in ranges:
-            raise fail(("fit", "start", key), f"is no factor; factors are {', '.join(ranges)}", value, list(ranges))
+            raise fail(("fit", "start", key), f"is not a factor; factors are {', '.join(ranges)}", value, list(ranges))
         if not ranges[key].low <= value <= ranges[key].high:
             raise fail(
                 ("fit", "start", key), f"{value:g} is out of its range; that is {ranges[key]}", value, ranges[key]
@@ -195,7 +195,7 @@ def _tried(answers: Callable[[list[Array]], Sequence[Answer]], place: Array) -> 
     slopes: list[list[Array]] = [[] for _ in here]
     for beside, step in zip(there, steps, strict=True):
         if isinstance(beside, str):
-            raise StudyError(f"the car cannot be driven beside drivable parameters: {beside}")
+            raise StudyError(f"the car cannot be driven with values close to drivable parameters: {beside}")
         for columns, side, series in zip(slopes, beside, here, strict=True):
             columns.append((side - series) / step)
     return here, [np.column_stack(columns) for columns in slopes]

@@ -182,7 +182,7 @@ def read_measured(folder: Path) -> MeasuredFile:
     table = build(MeasuredTable, given, source)
     for key in _OF_RUNS if table.circle is not None else ():
         if key in given:
-            raise source.fail((key,), "belongs to [[runs]], and not here")
+            raise source.fail((key,), "belongs in [[runs]], not here")
     own = folder / table.vehicle
     vehicle = str(own) if table.vehicle.endswith(".toml") or "/" in table.vehicle else table.vehicle
     try:
@@ -218,7 +218,7 @@ def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
     """Check circle and intervals, and turn the ends of a key into overrides."""
     table, source = file.table, file.source
     if set(file.tolerances) != {STEERING}:
-        raise source.fail(("quantities",), "a circle compares steering_wheel_deg alone", list(table.quantities))
+        raise source.fail(("quantities",), "a circle compares only steering_wheel_deg", list(table.quantities))
     if len(set(circle.steering_wheel_rad)) < 2 or not circle.spread:
         raise source.fail(
             ("circle",), "two different angles, and a spread of at least one value, are needed for distributions"
@@ -227,7 +227,7 @@ def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
     for key in set(circle.spread) - set(nominal):
         nominal[key] = value = _value(file.vehicle, key, source, ("circle", "spread", key), table.overrides)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise source.fail(("circle", "spread", key), "is no number that could vary", key)
+            raise source.fail(("circle", "spread", key), "is not a number that could vary", key)
     intervals = dict(table.intervals)
     changes = {("circle", "prediction"): circle.prediction}
     for key, interval in table.intervals.items():
@@ -257,7 +257,7 @@ def _factors(table: MeasuredTable, vehicle: str, source: Source) -> tuple[Factor
     keys = [factor.key for factor in factors]
     for key in table.predict.factors:
         if key not in keys:
-            raise source.fail(("predict", "factors"), f"{key} is no factor; {nearest_names(key, keys)}", key, keys)
+            raise source.fail(("predict", "factors"), f"{key} is not a factor; {nearest_names(key, keys)}", key, keys)
     if factors and not any(run.fit_s for run in table.runs):
         raise source.fail(("runs",), "a fit needs a run with fit_s = [start, end]")
     return factors
@@ -276,7 +276,7 @@ def _check_run(run: RunTable, folder: Path, source: Source, where: tuple[str, ..
         if window and (len(window) != 2 or window[0] >= window[1]):
             raise source.fail((*where, key), "[start, end] with start before end is needed", window)
     if not run.fit_s and not run.check_s:
-        raise source.fail((*where, "check_s"), "the run is used for nothing; give fit_s, check_s or both")
+        raise source.fail((*where, "check_s"), "the run has no purpose; give fit_s, check_s or both")
 
 
 def _quantities(

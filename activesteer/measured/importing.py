@@ -102,7 +102,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
     files = {file: read_columns(file) for file in paths}
     for name in chosen.shift_s:
         if name not in (names := [file.name for file in paths]):
-            raise RecordingError(f"is no imported file; {nearest_names(name, names)}", key=f"shift_s.{name}")
+            raise RecordingError(f"is not an imported file; {nearest_names(name, names)}", key=f"shift_s.{name}")
     every = [{column.name for column in columns} for columns in files.values()]
     repeated = [name for names in every for name in names if second_of(name) in names]
     model = load_car(vehicle).on(Road())

@@ -190,14 +190,14 @@ def _cache_of(function: Callable[..., Any], about: tuple[str, Path] | None = Non
 
 @functools.cache
 def _say_compiling() -> None:
-    _LOGGER.info("compiling native code, which is kept for the next time: some 15 s")
+    _LOGGER.info("compiling native code, about 15 s; later starts reuse it")
 
 
 @functools.cache
 def _say_uncached() -> None:
     _LOGGER.warning(
-        "no folder to keep compiled code in, every start compiles anew (some 15 s): set NUMBA_CACHE_DIR to one that "
-        "can be written"
+        "there is no writable folder for compiled code, so every start compiles again (about 15 s): "
+        "set NUMBA_CACHE_DIR to a writable folder"
     )
 
 

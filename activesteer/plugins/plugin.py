@@ -57,7 +57,7 @@ def declared_by(origin: Any) -> dict[str, Declared]:
     names = [*named, *(() if all(a.kind is not a.VAR_KEYWORD for a in arguments) else notes)]
     for name, note in notes.items():
         if name not in names:
-            raise ValueError(f"PARAMETERS names {name!r}, which is no argument; {nearest_names(str(name), names)}")
+            raise ValueError(f"PARAMETERS names {name!r}, which is not an argument; {nearest_names(str(name), names)}")
         if wrong := [key for key in note if key not in _NOTES]:
             raise ValueError(f"PARAMETERS[{name!r}]: {wrong[0]!r} is none of {', '.join(_NOTES)}")
     return {name: _declared(name, named.get(name), notes.get(name, {})) for name in dict.fromkeys(names)}
@@ -206,9 +206,7 @@ class Plugin:
         path = (self.kind.table, self.key)
         source = Source("", overridden=frozenset({".".join(path)}))
         if is_instance(self.origin):
-            raise source.fail(
-                path, "is an object, which is made already; give its class, or set the object's attribute"
-            )
+            raise source.fail(path, "is an object that already exists; give its class, or set the object's attribute")
         found = read_values(self.declared, values, source, path)
         for name in found:
             if name in self.parameters:

@@ -217,9 +217,9 @@ def check_metrics(metrics: Mapping[str, Any]) -> None:
     _count(len(metrics), limits.MAX_CHANNELS, "metrics")
     for name, value in metrics.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise RecordingError(f"metric name {name!r:.{_SHOWN}}: letters, digits and '_', a letter first")
+            raise RecordingError(f"metric name {name!r:.{_SHOWN}}: use letters, digits and '_', a letter first")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, which is no number", key=name, value=value)
+            raise RecordingError(f"metric {name!r} is {value!r:.{_SHOWN}}, not a number", key=name, value=value)
         if limits.too_large(float(value), infinite=True):
             limits.check_number(float(value), RecordingError, key=name)
 
@@ -229,7 +229,7 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
     _count(len(names), maximum, what)
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
-            raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is no name of 1 to 255 letters")
+            raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is not a name of 1 to 255 letters")
 
 
 def check_bodies(names: Sequence[Any]) -> None:
@@ -245,7 +245,7 @@ def check_numbers(values: Sequence[Any], what: str, low: float, high: float) -> 
     """Check sizes, positions or colours."""
     for value in values:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise RecordingError(f"{what}: {value!r:.{_SHOWN}} is no number from {low:g} to {high:g}")
+            raise RecordingError(f"{what}: {value!r:.{_SHOWN}} is not a number from {low:g} to {high:g}")
 
 
 FORMAT_VERSION = 1

@@ -355,6 +355,6 @@ def _bodies(topic: Channel | None) -> tuple[str, ...]:
         return ()
     names = json.loads(topic.metadata["bodies"])
     if not isinstance(names, list):
-        raise RecordingError("its bodies are no list")
+        raise RecordingError("its bodies are not a list")
     check_bodies(names)
     return tuple(names)

@@ -96,7 +96,7 @@ class Recording:
         found = self.metadata.pop("metrics", {})
         if not isinstance(found, Mapping):
             raise RecordingError(
-                f"is {found!r} in place of numbers by name", file="the metadata", key="metrics", value=found
+                f"is {found!r} where numbers by name are expected", file="the metadata", key="metrics", value=found
             )
         self.metrics: dict[str, float] = {**found, **(metrics or {})}
         self.attachments: dict[str, bytes] = dict(attachments or {})

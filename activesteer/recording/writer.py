@@ -74,7 +74,7 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
         ours = is_recording_start(stream.read(_START_BYTES))
     if not ours:
         raise RecordingError(
-            f"cannot write {path}: it exists already and is no recording of activesteer; delete or rename it",
+            f"cannot write {path}: it exists already and is not a recording of activesteer; delete or rename it",
             value=path,
         )
 

@@ -102,7 +102,7 @@ def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
         raise ManeuverError(f"refers to more than {limits.MAX_CRG_FILES} files in a chain")
     for block in ("ROAD_CRG", "KD_DEFINITION"):
         if block not in blocks:
-            raise ManeuverError(f"is no OpenCRG file: there is no block ${block}")
+            raise ManeuverError(f"is not an OpenCRG file: there is no block ${block}")
     return _road(_values(blocks["ROAD_CRG"]), _values(mods or []), blocks["KD_DEFINITION"], data)
 
 
@@ -221,7 +221,7 @@ def _data(data: bytes, form: str, columns: int) -> Array:
             try:
                 found[row, column] = math.nan if cell.startswith("*") else float(cell)
             except ValueError as reason:
-                raise ManeuverError(f"row {row + 1} of the data: {shown(cell)} is no number") from reason
+                raise ManeuverError(f"row {row + 1} of the data: {shown(cell)} is not a number") from reason
     return found
 
 
@@ -236,7 +236,7 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
         return np.linspace(right, left, count, dtype=np.float64)
     step = head.get("long_section_v_increment")
     if step is None or not step > 0.0:
-        raise ManeuverError("does not say where its long sections lie")
+        raise ManeuverError("does not give the positions of its long sections")
     first = -0.5 * step * (count - 1) if right is None else right
     return first + step * np.arange(count, dtype=np.float64)
 

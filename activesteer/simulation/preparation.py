@@ -189,7 +189,7 @@ def _steady_turn(scenario: Scenario, probe: StepSteer, wanted: float, timestep_s
             angle = a1 + (wanted - r1) * (a1 - a0) / (r1 - r0)
     best = min(tried, key=lambda pair: abs(pair[1] - wanted))
     raise ManeuverError(
-        f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the control-free car; the "
+        f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the car without control; the "
         f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
         f"(road.mu {probe.road.mu:g})?",
         value=wanted,
@@ -224,8 +224,8 @@ def _ramp_angle(scenario: Scenario, wanted: float, timestep_s: float) -> float:
     wheel = _rows(recorder, "steering_wheel_rad")
     if ay.max() < high:
         raise ManeuverError(
-            f"{probe.name}: the control-free car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg at "
-            f"the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
+            f"{probe.name}: without control the car reaches {ay.max():.3g} m/s2 with {np.degrees(wheel.max()):.0f} deg "
+            f"at the steering wheel, but {high:.3g} m/s2 ({high / GRAVITY_MPS2:.3g} g) are needed: is the road too "
             f"slippery (road.mu {probe.road.mu:g})? Give the amplitude instead (steering_wheel_deg)",
             value=high,
         )

@@ -72,7 +72,7 @@ def _crossings(x: Array, y: Array, sign: float) -> Array:
     """Return the interpolated values of y where x passes through zero, upwards (1) or downwards (-1)."""
     places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
     if places.size == 0:
-        raise RecordingError("the signals make no loop: one of them does not pass through zero")
+        raise RecordingError("the signals form no loop: one of them does not pass through zero")
     fraction = x[places] / (x[places] - x[places + 1])
     return y[places] + fraction * (y[places + 1] - y[places])
 

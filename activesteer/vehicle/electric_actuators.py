@@ -76,7 +76,7 @@ class Motor:
             )
         if (self.split_torque_Nm is not None) is not (self.differential == "splitting"):
             raise ParameterError(
-                "belongs to differential = 'splitting', and only to it",
+                "has an effect only with differential = 'splitting'",
                 key="split_torque_Nm",
                 value=self.split_torque_Nm,
             )

@@ -61,8 +61,8 @@ class LocalState:
         model = vehicle.model
         if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:
             raise ParameterError(
-                "straight driving is no equilibrium on an uneven or banked road; linear analyses need a road without "
-                "bank, obstacles and surfaces",
+                "straight driving is not an equilibrium on an uneven or banked road; linear analyses need a road "
+                "without bank, obstacles and surfaces",
                 key="road",
             )
         dof_names = []

@@ -319,8 +319,8 @@ class WheelSet:
         for corner, torque in zip(CORNERS, torques_Nm, strict=True):
             if torque != 0.0 and corner not in self._driven:
                 raise ParameterError(
-                    f"demands {torque:g} N m at {corner}, which nothing drives; driven are {', '.join(self._driven)}, "
-                    "and [motors] in the vehicle file can drive any wheel",
+                    f"demands {torque:g} N m at {corner}, a wheel without a drive; driven are {', '.join(self._driven)}"
+                    "; [motors] in the vehicle file can drive any wheel",
                     key="wheel_torque_demand_Nm",
                     value=torque,
                 )

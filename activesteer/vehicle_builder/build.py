@@ -143,11 +143,11 @@ def _install(files: Path, target: Path) -> None:
 def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None) -> KcTables | None:
     guided = [axle for axle, kind in kinds.items() if kind.guided]
     if guided and kc is None:
-        raise ParameterError(f"the {guided[0]} axle is of curves: the folder of its measurements is needed (--kc)")
+        raise ParameterError(f"the {guided[0]} axle has curves, so the folder of its measurements is needed (--kc)")
     if kc is not None and not guided:
         raise ParameterError(
-            'no axle of the table is of the type "curves", so the measurements would have no effect; --front curves '
-            "and --rear curves make them so",
+            'no axle of the table is of the type "curves", so the measurements would have no effect; use '
+            "--front curves or --rear curves",
             key="--kc", value=kc,
         )  # fmt: skip
     return None if kc is None else read_kc(Path(kc), guided)
@@ -187,7 +187,7 @@ def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, Tyre
         return name, load_tir(shipped), None
     present = [path.name for path in (models_dir() / "tyres").glob("*.tir")]
     raise TyreFileError(
-        f"there is no file {shown(name)} beside the table or in models/tyres; {nearest_names(name, present)}",
+        f"there is no file {shown(name)} next to the table or in models/tyres; {nearest_names(name, present)}",
         key=f"{axle}.tyre",
         value=name,
         allowed=present,

@@ -48,7 +48,7 @@ def _rack_per_steer(front: Axle) -> float:
     if abs(per_steer) < 0.02:
         raise ParameterError(
             f"the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm and cannot steer the wheel; "
-            "tie_rod_outer has to lie ahead of or behind the line through the upper and the lower joint",
+            "tie_rod_outer must lie ahead of or behind the line through the upper and the lower joint",
             key="front",
         )
     return per_steer
@@ -236,8 +236,8 @@ def _axle(
     )
     if spin > 2.0 * across:
         raise ParameterError(
-            f"is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} kg m2; no body has more than twice "
-            "of that about its axle",
+            f"is {spin:.3g} and wheel_inertia_kgm2, about a diameter, {across:.3g} kg m2; the former can be at most "
+            "twice the latter",
             key=f"{axle}.wheel_spin_inertia_kgm2",
             value=spin,
         )
@@ -381,7 +381,7 @@ def check_origin(car: CarDesign, given: CarTable) -> None:
         say = ", ".join(f"{value:.4g}" for value in np.array(given.origin) + off)
         raise ParameterError(
             f"is at x {centre[0]:.3f} m, {centre[2]:.3f} m above the origin; vehicle coordinates begin on the road "
-            f"below the front axle, and the tyre's radius is {radius:.3f} m. Say where that point lies in the table's "
+            f"below the front axle, and the tyre's radius is {radius:.3f} m. Give that point in the table's "
             f"coordinates: about origin = [{say}] ({given.units})",
             key="front.points.wheel_centre",
         )

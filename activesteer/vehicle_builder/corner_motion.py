@@ -49,9 +49,9 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float],
     _, values, vectors = np.linalg.svd(jacobian / np.where(lengths > 0.0, lengths, 1.0))
     free = len(dofs) - int(np.sum(values > 1e-6))
     if free != 1:
-        many = "no way" if free < 1 else f"{free} ways"
-        counts = f"{len(dofs)} degrees of freedom and {len(links)} links"
-        raise ModelError(f"{counts} leave the wheel {many} to travel; 1 is needed", key=corner)
+        many = "no degree of freedom" if free < 1 else f"{free} degrees of freedom"
+        counts = f"{len(dofs)} coordinates and {len(links)} links"
+        raise ModelError(f"{counts} leave the wheel {many}; exactly 1 is required", key=corner)
     direction = vectors[-1] / scale
     along = np.zeros((3, model.nv))
     wheel = model.body(f"{corner}_wheel").id

@@ -190,8 +190,8 @@ def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
     own = np.diag(left)
     if own.min() <= 0.0 or 2.0 * own.max() > own.sum():
         raise ParameterError(
-            f"of {_words(inertia)} kg m2 of the whole car {_words(own)} are left for the chassis "
-            "when wheels and suspensions are taken away; no body has such an inertia (each at most both others)",
+            f"of the {_words(inertia)} kg m2 of the whole car, {_words(own)} remain for the chassis "
+            "without wheels and suspensions; each of the three can be at most the sum of the others",
             key="mass.inertia_kgm2",
         )
     return Solid(mass, chassis_cg, own)

@@ -124,7 +124,7 @@ def _check_files(folder: Path) -> None:
     known = [f"{axle}_{name}" for axle in ("front", "rear") for name in TESTS]
     for path in sorted(folder.iterdir()):
         if path.suffix in (".csv", ".toml") and path.stem.startswith(("front_", "rear_")) and path.stem not in known:
-            raise ParameterError(f"no test is named so; {nearest_names(path.stem, known)}", file=path.name)
+            raise ParameterError(f"there is no such test; {nearest_names(path.stem, known)}", file=path.name)
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,9 @@ def _translation(folder: Path) -> _Names:
     found = build(_Names, raw, source)
     for channel, sign in found.signs.items():
         if channel not in CHANNELS:
-            raise source.fail(("signs", channel), f"no channel is named so; {nearest_names(channel, CHANNELS)}")
+            raise source.fail(("signs", channel), f"there is no such channel; {nearest_names(channel, CHANNELS)}")
         if sign not in (1, -1):
-            raise source.fail(("signs", channel), f"{sign!r} is no sign; 1 and -1 are")
+            raise source.fail(("signs", channel), f"{sign!r} is not a sign; 1 or -1 is needed")
     return found
 
 
@@ -203,7 +203,7 @@ def _numbers(head: str, values: Any, source: Source) -> Array:
     try:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as reason:
-        raise source.fail((head,), "holds something that is no number") from reason
+        raise source.fail((head,), "contains a value that is not a number") from reason
     if numbers.ndim != 1 or not (np.abs(numbers) <= limits.MAX_NUMBER).all():
         raise source.fail((head,), f"must be a list of finite numbers up to {limits.MAX_NUMBER:g}")
     return numbers
@@ -213,7 +213,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
     """Return the channel of a column, with its side, and the factor to SI units."""
     match = _HEAD.fullmatch(name)
     if match is None:
-        raise ParameterError(f"{name!r} is no channel with its unit, as 'left_toe [deg]'", file=file.name, key=head)
+        raise ParameterError(f"{name!r} is not a channel with its unit, as 'left_toe [deg]'", file=file.name, key=head)
     channel = match["name"].strip().lower().replace(" ", "_")
     bare = channel.removeprefix("left_").removeprefix("right_")
     if bare not in CHANNELS:
@@ -226,7 +226,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
     if found is None or not alike(found, find_unit(unit)):
         known = [name for name in UNIT_NAMES if alike(find_unit(name), find_unit(unit))]
         raise ParameterError(
-            f"{match['unit']!r} is no unit of {bare}; known are {', '.join(known)}", file=file.name, key=head
+            f"{match['unit']!r} is not a unit of {bare}; known are {', '.join(known)}", file=file.name, key=head
         )
     return channel, found.factor
 
@@ -267,11 +267,11 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
     common = set(parts[0]).intersection(*parts[1:])
     left_out = set().union(*parts) - common
     if left_out:
-        raise ParameterError(f"{', '.join(sorted(left_out))} of one wheel only", file=file.name)
+        raise ParameterError(f"{', '.join(sorted(left_out))} given for one wheel only", file=file.name)
     x = np.concatenate(xs)
     order = np.argsort(x, kind="stable")
     if not x[order[0]] < 0.0 < x[order[-1]]:
-        raise ParameterError(f"{test.variable} does not go to both sides of 0", file=file.name)
+        raise ParameterError(f"{test.variable} has no values on one side of 0", file=file.name)
     if (places := len(np.unique(x))) < _LEAST_POINTS:
         raise ParameterError(
             f"has {places} different values; at least {_LEAST_POINTS} are needed", file=file.name, key=test.variable

@@ -242,7 +242,7 @@ def read_table(path: Path) -> tuple[CarTable, Source]:
         raise ParameterError("a table ends in .toml or .csv", file=str(path))
     table = build(CarTable, raw, source)
     if table.units not in UNITS:
-        raise source.fail(("units",), f"{table.units!r} is no unit of length here; {nearest_names(table.units, UNITS)}")
+        raise source.fail(("units",), f"{table.units!r} is not a unit of length; {nearest_names(table.units, UNITS)}")
     return table, source
 
 
@@ -443,7 +443,7 @@ def _unit_problems(table: CarTable) -> Iterator[str]:
             low, high, factor, unit = _PLAUSIBLE[key]
             if not low <= value <= high and value != 0.0:
                 hint = f"; is it in {unit}? then write {value * factor:g}" if low <= value * factor <= high else ""
-                yield f"{path}: {value:g} is no value of a road car ({low:g} to {high:g}){hint}"
+                yield f"{path}: {value:g} is not a value of a road car ({low:g} to {high:g}){hint}"
 
 
 def _numbers(part: Any, path: str = "") -> Iterator[tuple[str, float]]:

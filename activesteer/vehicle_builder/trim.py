@@ -313,7 +313,7 @@ def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
     tyre = tyre_rate_Npm(axle.tyre_parameters, load_N)
     if ride > 0.8 * tyre:
         raise ModelError(
-            f"{axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, but the tyre alone has "
+            f"{axle.ride_frequency_Hz:g} Hz of {sprung_kg:.0f} kg needs {ride:.0f} N/m, but the tyre has only "
             f"{tyre:.0f} N/m",
             key=f"{axle.name}.ride_frequency_Hz",
             value=axle.ride_frequency_Hz,
@@ -411,13 +411,13 @@ def _let_stand(
                 axle_trim.spring_rate_Npm -= off * rate / ratio**2
                 if axle_trim.spring_rate_Npm <= 0.0:
                     raise ModelError(
-                        f"the links alone give a wheel rate above the desired {rate:.0f} N/m", key=axle.name
+                        f"the links already give a wheel rate above the desired {rate:.0f} N/m", key=axle.name
                     )
         if done:
             return rates
     where = ", ".join(f"{1e3 * value:.2f}" for value in left_m)
     raise ModelError(
-        f"the car does not come to stand in its design position within {_ROUNDS} rounds: wheels at {where} mm of "
+        f"the car does not settle in its design position within {_ROUNDS} rounds: wheels at {where} mm of "
         "travel; are spring rates and stops possible?"
     )
 

@@ -246,7 +246,7 @@ def encoder(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Calla
         def failure() -> PlaybackError:
             log.seek(0)
             said = (log.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
-            return PlaybackError(f"cannot write {path}: ffmpeg says: {said}", value=said)
+            return PlaybackError(f"cannot write {path}: ffmpeg reports: {said}", value=said)
 
         def write(pixels: NDArray[np.uint8]) -> None:
             try:

@@ -100,7 +100,7 @@ class Offscreen:
         if self._drawer.offWidth < size[0] or self._drawer.offHeight < size[1]:
             maximum = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
             self.close()
-            raise PlaybackError(f"pictures of {size[0]} x {size[1]} are larger than what can be drawn here: {maximum}")
+            raise PlaybackError(f"pictures of {size[0]} x {size[1]} exceed the size that can be drawn here: {maximum}")
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:

@@ -12,7 +12,7 @@ import pytest
 
 from activesteer.commands.cli import main
 
-COMPILING = "activesteer: compiling native code, which is kept for the next time: some 15 s\n"
+COMPILING = "activesteer: compiling native code, about 15 s; later starts reuse it\n"
 
 
 class Told(NamedTuple):
@@ -33,7 +33,7 @@ class Told(NamedTuple):
         """Return standard output as JSON; it must be JSON from the first to the last character."""
 
         def refuse(word: str) -> None:
-            pytest.fail(f"{word} is no JSON")
+            pytest.fail(f"{word} is not JSON")
 
         return json.loads(self.out, parse_constant=refuse)
 

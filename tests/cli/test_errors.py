@@ -49,7 +49,7 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "-c", "ars", "-c", "ars"], ["-c ars -c ars", "same name"]),
         (
             ["step_steer", "-c", "ars", "-c", "afs", "-o", "a.mcap"],
-            ["-o a.mcap: one file", "give a folder"],
+            ["-o a.mcap: 2 controllers need a folder"],
         ),
         (["step_steer", "-o", "film.mp4"], ["-o film.mp4", "ends in .mcap"]),
     ],
@@ -113,7 +113,7 @@ def test_bad_files_are_answered_with_file_key_and_line(call, tmp_path):
     (tmp_path / "mine.toml").write_text('kind = "open_loop"\nspeed_kmh = 80\nduration_s = "long"\n')
     refused(call("run", "mine.toml"), "mine.toml, line 3: duration_s: 'long' is not a number")
     (tmp_path / "mine.toml").write_text('kind = "open_loop\n')
-    refused(call("run", "mine.toml"), "mine.toml: no valid TOML", "line 1")
+    refused(call("run", "mine.toml"), "mine.toml: invalid TOML", "line 1")
     shipped = find_vehicle("compact").read_text()
     (tmp_path / "car.toml").write_text(shipped.replace("compact/compact.xml", str(tmp_path / "car.xml")))
     (tmp_path / "car.xml").write_text("<mujoco><worldbody></worldbody></mujoco>")
@@ -184,7 +184,7 @@ def test_file_that_is_no_recording_is_kept_and_nothing_runs(call, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "straight_line-ars.mcap").write_text("my notes")
     told = call("run", "straight_line", "-c", "none", "-c", "ars", *SHORT, "-o", "out")
-    refused(told, "straight_line-ars.mcap: it exists already and is no recording of activesteer")
+    refused(told, "straight_line-ars.mcap: it exists already and is not a recording of activesteer")
     (tmp_path / "out" / "slalom-afs.mcap").write_text("my notes")
     refused(call("reproduce", "-o", "out"), "slalom-afs.mcap: it exists already")
     assert {path.read_text() for path in (tmp_path / "out").iterdir()} == {"my notes"}

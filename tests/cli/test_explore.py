@@ -189,7 +189,9 @@ def test_a_dead_worker_is_replaced(url: str) -> None:
         assert page.hear("description")
 
 
-@pytest.mark.parametrize(("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "missing"], "no folder")])
+@pytest.mark.parametrize(
+    ("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "missing"], "not a folder")]
+)
 def test_wrong_options_are_refused_in_one_line(
     call: Call, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
 ) -> None:

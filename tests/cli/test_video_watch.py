@@ -39,7 +39,7 @@ def test_video_that_cannot_be_made_is_refused_in_one_message(call, file, words, 
 
 
 def test_video_compared_with_itself_is_refused(call, file):
-    refused(call("video", file, "--compare", file, "-o", "a.mp4"), "is named twice")
+    refused(call("video", file, "--compare", file, "-o", "a.mp4"), "is given twice")
 
 
 def test_recording_without_a_car_is_no_film(call, file, tmp_path):

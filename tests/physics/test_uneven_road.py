@@ -123,7 +123,7 @@ def test_friction_and_heights_follow_a_path() -> None:
 def test_linear_analyses_refuse_an_uneven_or_banked_road() -> None:
     bump = Obstacle("cosine_bump", 10.0, 3.0, 0.05)
     for road in (Road(bank_rad=0.05), Road(obstacle=(bump,))):
-        with pytest.raises(ParameterError, match="no equilibrium on an uneven or banked road"):
+        with pytest.raises(ParameterError, match="not an equilibrium on an uneven or banked road"):
             LocalState(load_car().on(road))
 
 
@@ -135,7 +135,7 @@ def test_linear_analyses_refuse_an_uneven_or_banked_road() -> None:
         ({"obstacle": [{"kind": "bump", "start_m": 6.0}]}, "allowed are 'cosine_bump'"),
         ({"obstacle": [{"kind": "cosine_bump", "start_m": 1.0, "length_m": 1.0, "height_m": 0.1}]}, "at least 2"),
         ({"obstacle": [{"kind": "kerb", "start_m": 6.0, "height_m": 0.1, "waves": 3}]}, "no effect on this kerb"),
-        ({"banking": {"s_m": [0.0, 10.0], "bank_deg": [0.0]}}, "bank_deg: has 1 values beside 2 of s_m"),
+        ({"banking": {"s_m": [0.0, 10.0], "bank_deg": [0.0]}}, "bank_deg: has 1 values, but s_m has 2"),
         ({"bank": 3.0}, "give bank_deg for the whole road"),
         ({"bumps": []}, "give tables"),
     ],

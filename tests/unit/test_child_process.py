@@ -76,7 +76,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("part", "hangs: a test took longer than 0.2 s"),
         ("drip", "hangs: a test took longer than 0.2 s"),
         ("close", "closed its connection in a test"),
-        ("long", f"answers with {2**62} bytes, of which at most 100 are allowed"),
+        ("long", f"answers with {2**62} bytes; at most 100 are allowed"),
     ],
 )
 def test_a_child_that_does_not_answer_is_a_fault_within_a_second_of_its_limit(served: Path, word: str, said: str):

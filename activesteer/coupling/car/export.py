@@ -123,7 +123,7 @@ def _identifier(name: str) -> str:
 def _export(scenario: Scenario) -> Export:
     """Build the car, let it settle, and compile it into a library."""
     if scenario.maneuver.fault:
-        raise ParameterError("an exported car has no faults of a manoeuvre; leave them out", key="fault")
+        raise ParameterError("an exported car cannot have the faults of a manoeuvre; leave them out", key="fault")
     scenario = with_amplitude_found(scenario)
     loop = ClosedLoop(scenario)
     sensors = scenario.car.config.sensors

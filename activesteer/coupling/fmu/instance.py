@@ -150,7 +150,7 @@ class LocalInstance:
         name = "SerializedFMUstateSize" if self._spec.version == 2 else "SerializedFMUStateSize"
         self._must(name, (_P, _P), pointer, ctypes.byref(size))
         if size.value > _MAX_STATE_BYTES:
-            raise FmuFault(f"says that its state has {size.value} bytes")
+            raise FmuFault(f"reports a state of {size.value} bytes")
         content = ctypes.create_string_buffer(max(1, size.value))
         self._must(f"Serialize{self._state}", (_P, _P, _N), pointer, content, size)
         return struct.pack("=q", steps) + content.raw[: size.value]
@@ -204,7 +204,7 @@ class LocalInstance:
             component = make(name, token, resources, False, False, False, False, None, 0, None, logger, None)
         if not component:
             hint = f" (its description has the token {spec.token}, which the library may not know)"
-            raise FmuFault(f"refuses to be instantiated{self._words() or hint}")
+            raise FmuFault(f"cannot be instantiated{self._words() or hint}")
         return component
 
     def _initialise(self) -> None:

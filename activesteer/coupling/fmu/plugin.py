@@ -100,7 +100,7 @@ def linked(
         if wanted == _NO_SIGNAL:
             continue
         if wanted in signals.others:
-            message = f'{wanted} is no number and cannot be a signal of an FMU; signal = "none" leaves {name} alone'
+            message = f'{wanted} is not a number and cannot be a signal of an FMU; signal = "none" ignores {name}'
             raise source.fail((name,), message, wanted)
         if (signal := signals.full(wanted)) is None:
             left.append(name)
@@ -124,7 +124,7 @@ def _entry(name: str, entry: Any, signals: Signals, source: Source) -> str:
         problem = f"{signals.words} has no signal {shown(wanted)}; {near}"
         raise source.fail((name, "signal"), problem, wanted, list(signals.places))
     if (unit := entry.get("unit")) is not None and find_unit(unit) is None:
-        problem = f"{shown(unit)} is no known unit; {nearest_names(unit, UNIT_NAMES)}"
+        problem = f"{shown(unit)} is not a known unit; {nearest_names(unit, UNIT_NAMES)}"
         raise source.fail((name, "unit"), problem, unit, UNIT_NAMES)
     return wanted
 
@@ -391,9 +391,9 @@ class Fmu:
             words = [f"{word} {', '.join(names)}" for word, names in left.items() if names]
             example = (*no_input, *no_output)[0]
             raise self.fail(
-                f"no signals have the names of its {' and '.join(words)}; rename them, or write "
-                f"{self.path.stem}.toml beside it: {example} = {{ signal = \"yaw_rate_radps\", unit = \"deg/s\" }}, or "
-                f"{{ signal = \"none\" }} to leave one alone",
+                f"no signals match the names of its {' and '.join(words)}; rename them, or write "
+                f"{self.path.stem}.toml next to it: {example} = {{ signal = \"yaw_rate_radps\", unit = \"deg/s\" }}, "
+                f"or {{ signal = \"none\" }} to ignore one",
                 (*no_input, *no_output),
             )  # fmt: skip
         if not outputs:

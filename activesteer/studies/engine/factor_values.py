@@ -27,7 +27,8 @@ class FactorValues:
         for number, factor in enumerate(study.factors):
             if factor.of and factor.of not in (earlier := [other.key for other in study.factors[:number]]):
                 where = ("factors", factor.key, "of")
-                raise study.source.fail(where, f"is no earlier factor; {nearest_names(factor.of, earlier)}", factor.of)
+                problem = f"is not an earlier factor; {nearest_names(factor.of, earlier)}"
+                raise study.source.fail(where, problem, factor.of)
             for name in factor.maneuvers:
                 if name not in labels:
                     place = ("factors", factor.key, "maneuvers")
@@ -36,16 +37,16 @@ class FactorValues:
                 place = ("factors", factor.key, "when", other)
                 if other not in self._factors:
                     raise study.source.fail(
-                        place, f"is no other factor; {nearest_names(other, list(self._factors))}", other
+                        place, f"is not another factor; {nearest_names(other, list(self._factors))}", other
                     )
                 for value in wanted:
                     if value not in self._factors[other].values:
-                        raise study.source.fail(place, f"{shown(value)} is no value of that factor", value)
+                        raise study.source.fail(place, f"{shown(value)} is not a value of that factor", value)
             for other in factor.grows_with:
                 if other not in self._factors or self._factors[other].nominal or self._factors[other].values:
                     ranges = [key for key, of in self._factors.items() if not (of.nominal or of.values)]
                     place = ("factors", factor.key, "grows_with", other)
-                    raise study.source.fail(place, f"is no other range; {nearest_names(other, ranges)}", other)
+                    raise study.source.fail(place, f"is not another range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the overrides of a run for the keys that vary in its manoeuvre, None for the value of the files."""

@@ -121,7 +121,7 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
     """Read a factor from its table in a study file."""
     where, kinds = ("factors", key), ", ".join(KINDS)
     if not isinstance(table, Mapping):
-        problem = f"{shown(table)} is no table; {{ uniform = [low, high] }} or another of {kinds} is needed"
+        problem = f"{shown(table)} is not a table; {{ uniform = [low, high] }} or another of {kinds} is needed"
         raise source.fail(where, problem)
     given = build(FactorTable, table, source, where)
     found = [kind for kind in KINDS if kind in table]
@@ -133,7 +133,7 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         if value in ([], {}, ""):
             raise source.fail((*where, name), "is empty", value)
     if given.of and given.nominal is None:
-        raise source.fail((*where, "of"), "names an earlier factor, and stands beside nominal", given.of)
+        raise source.fail((*where, "of"), "names an earlier factor, and needs nominal", given.of)
     if given.grows_with and given.nominal != "times":
         raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', given.grows_with)
     factor = Factor(**vars(given), key=key)
@@ -155,7 +155,7 @@ def _checked_ends(factor: Factor, source: Source) -> tuple[float, ...]:
         place = ("factors", factor.key, "truncate")
         low, high = _pair(factor.truncate, source, place) if factor.truncate else around
         if low >= high or ndtr((low - first) / second) == ndtr((high - first) / second):
-            raise source.fail(place, f"between {low:g} and {high:g} there is nothing of the distribution")
+            raise source.fail(place, f"the distribution has no values between {low:g} and {high:g}")
         return low, high
     if first >= second:
         raise source.fail(where, f"the lower end {first:g} is not below the upper end {second:g}")
@@ -169,14 +169,14 @@ def _check_values(factor: Factor, source: Source) -> None:
     where, given, weights = ("factors", factor.key, factor.kind), factor.values, factor.weights
     for value in given:
         if not is_plain(value):
-            raise source.fail(where, f"{shown(value)} is no number, text, true or false", value)
+            raise source.fail(where, f"{shown(value)} is not a number, text, true or false", value)
     if any(given.count(value) > 1 for value in given):
-        raise source.fail(where, "a value stands in it twice")
+        raise source.fail(where, "a value is given twice")
     place = ("factors", factor.key, "weights")
     if weights and len(weights) != len(given):
         raise source.fail(place, f"as many weights as values are needed: {len(given)}")
     if weights and not (min(weights) >= 0.0 and sum(weights) > 0.0):
-        raise source.fail(place, f"{shown(list(weights))} are no weights: at least 0, not all of them 0")
+        raise source.fail(place, f"{shown(list(weights))} are not weights: each must be at least 0, and not all 0")
 
 
 def _pair(given: Sequence[float], source: Source, where: Sequence[str]) -> tuple[float, float]:

@@ -116,7 +116,7 @@ def _labelled(study: StudyFile, key: str) -> Any:
     labels = [label_of(item) for item in items]
     for label in labels:
         if labels.count(label) > 1:
-            raise study.source.fail((key,), f"two of them have the name {label!r}, which tells runs apart")
+            raise study.source.fail((key,), f"two of them have the name {label!r}; names must be unique")
     return tuple(zip(labels, items, strict=True))
 
 
@@ -147,7 +147,7 @@ def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorVa
     for key in study.keys:
         if key not in effective:
             place = ("design", "cases", key) if study.case_list else ("factors", key)
-            raise study.source.fail(place, "changes nothing in any of the study's runs")
+            raise study.source.fail(place, "has no effect in any of the study's runs")
 
 
 def _resolved(

@@ -123,7 +123,7 @@ class Store:
                 _compare(read_environment(self.folder), about, self.folder)
             else:
                 if any(self.folder.glob("*.parquet")) or any(self._parts.iterdir()):
-                    raise StudyError(f"{self.folder} holds results, but not what they are of; use a new folder")
+                    raise StudyError(f"{self.folder} holds results without their study; use a new folder")
                 write_text(self.folder / "study.toml", study_toml, StudyError)
                 write_text(path, json.dumps(about, indent=2) + "\n", StudyError)
             for left in self._parts.glob(".*"):  # left by a process that was killed while writing

@@ -150,7 +150,9 @@ def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
     for key in (*_LISTS, "driver"):
         items = [read.driver] if key == "driver" else getattr(read, key)
         if key in table and not (items and all(isinstance(item, (str, Mapping)) for item in items)):
-            raise source.fail((key,), f"{shown(table[key])} is no name, file or table, nor a list of them", table[key])
+            raise source.fail(
+                (key,), f"{shown(table[key])} is not a name, file or table, nor a list of them", table[key]
+            )
     if search and search not in table:
         raise source.fail((search,), f"the table is missing: {SEARCHES[search]}")
     located = {
@@ -202,7 +204,7 @@ def _cases(given: object, folder: Path, source: Source) -> Samples | None:
     for row in given:
         for key, value in row.items():
             if value is not None and not is_plain(value):
-                raise source.fail(where, f"{shown(value)} of {key} is no number, text, true or false", value)
+                raise source.fail(where, f"{shown(value)} of {key} is not a number, text, true or false", value)
     return cases(given)
 
 

@@ -178,7 +178,7 @@ class DaskCluster(Workers):
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
             raise StudyError(
-                "the scheduler or its workers are gone; what is finished is kept, start the study again to go on"
+                "the scheduler or its workers are lost; finished runs are kept, start the study again to resume"
             ) from reason
         self._count()
 
@@ -216,7 +216,7 @@ def connected(scheduler: str) -> Iterator[Any]:
         where = {"scheduler_file": scheduler}
     else:
         raise StudyError(
-            "is no address, as tcp://host:8786, and no scheduler file", key=f"--scheduler {scheduler}", value=scheduler
+            "is neither an address such as tcp://host:8786 nor a file", key=f"--scheduler {scheduler}", value=scheduler
         )
     try:
         client = Client(**where, timeout=_CONNECT_S)

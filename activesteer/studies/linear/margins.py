@@ -444,7 +444,7 @@ def worst_margins(
     given, changed = read_study(study_file), dict(overrides or {})
     for key in changed:
         if key in given.keys:
-            raise given.source.fail(("factors", key), "is varied by the study; it cannot be given beside it")
+            raise given.source.fail(("factors", key), "is varied by the study, so it cannot also be given")
     names = tuple(name for name in controllers if isinstance(name, str))
     study = replace(
         given, maneuvers=(straight_on(speeds_kmh[0] / 3.6),), vehicles=(vehicle,), controllers=names or ("none",),

@@ -72,7 +72,7 @@ def data_of(page: str) -> list[dict[str, Any]]:
     assert found
 
     def refuse(word: str) -> None:
-        pytest.fail(f"{word} is no JSON")
+        pytest.fail(f"{word} is not JSON")
 
     return json.loads(found[1], parse_constant=refuse)["groups"]
 

@@ -141,14 +141,14 @@ def test_an_expression_is_a_number_and_divides_by_zero():
         ("lane_overstep_m(lqr, lanes) <= 0", "'lane'"),
         ("claim(S2)", "'S1'"),
         ("__import__('os') <= 0", "__import__"),
-        ("lane_overstep_m.x(lqr) <= 0", "is no number"),
+        ("lane_overstep_m.x(lqr) <= 0", "is not a number"),
         ("lane_overstep_m(lqr) == 1", "one of <=, >="),
         ("max(1) <= lane_overstep_m(lqr)", "max has 1"),
         ("(" * 900, "cannot be read"),
         ("9" * 900 + " <= lane_overstep_m(lqr)", "cannot be read"),
         ("9" * 2000, "characters"),
-        ("[lane_overstep_m(lqr)][0] <= 1", "is no number"),
-        ("True <= lane_overstep_m(lqr)", "is no number"),
+        ("[lane_overstep_m(lqr)][0] <= 1", "is not a number"),
+        ("True <= lane_overstep_m(lqr)", "is not a number"),
         ("not lane_overstep_m(lqr) <= 1", "one of <=, >="),
     ],
 )
@@ -161,6 +161,6 @@ def test_a_text_that_is_no_requirement_is_refused(text: str, words: str):
 def test_the_examined_controller_is_named_only_where_there_is_one():
     with raises(StudyError, key="tune.violate") as told:
         Requirement("harm(controller) <= 1", NAMES._replace(examined=""), *WHERE)
-    assert "controller is no controller of the runs" in str(told.value)
+    assert "controller is not a controller of the runs" in str(told.value)
     open_names = Names(None, [""], ANY)
     assert list(Requirement("harm(controller) <= 1", open_names, *WHERE).metrics)[1][1].controller == "none"

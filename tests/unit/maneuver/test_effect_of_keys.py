@@ -145,7 +145,7 @@ def test_key_without_effect_is_answered_with_the_one_that_overrules_it(name, ove
     with pytest.raises(ParameterError) as told:
         resolve(name, overrides=overrides)
     assert told.value.key == key
-    assert "has no effect beside" in told.value.problem
+    assert "has no effect together with" in told.value.problem
     assert other in told.value.problem
 
 

@@ -76,7 +76,7 @@ def test_files_of_the_same_controller_are_told_apart_by_their_names(file: Path, 
     [
         (["missing.mcap"], "cannot read missing.mcap: No such file"),
         (["{file}", "--compare"], "--compare needs at least two files"),
-        (["{file}", "{file}"], "is named twice"),
+        (["{file}", "{file}"], "is given twice"),
         (["{file}", "--save", "nowhere/out.rrd"], "cannot write nowhere/out.rrd: No such file or directory"),
         ([__file__], "is not an MCAP file"),
     ],

@@ -209,7 +209,7 @@ def test_a_bad_grid_is_one_error(change: Any, problem: str) -> None:
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
-        (b"", "no OpenCRG file"),
+        (b"", "not an OpenCRG file"),
         (b"$KD_DEFINITION\n$\n$ROAD_CRG\nREFERENCE_LINE_INCREMENT = x\n$\n", "not a finite number"),
         *(
             (
@@ -228,7 +228,7 @@ def test_a_bad_grid_is_one_error(change: Any, problem: str) -> None:
             "not a finite number",
         ),
         (b"$ROAD_CRG\nA = 1\n$\n$KD_DEFINITION\n#:XYZ\n$\n$$$$\n", "known are LRFI"),
-        (HEAD.format(form="LRFI", more="", blocks="").encode() + b" 0.0 junk \n" * 9, "is no number"),
+        (HEAD.format(form="LRFI", more="", blocks="").encode() + b" 0.0 junk \n" * 9, "is not a number"),
     ],
 )
 def test_a_bad_file_is_one_error(content: bytes, problem: str) -> None:
@@ -240,7 +240,7 @@ def test_a_reference_through_the_environment_is_refused() -> None:
     with pytest.raises(ManeuverError, match="without environment variables"):
         referenced(b"$ROAD_CRG_FILE\n$HOME/x.crg\n$\n")
     for text in ((), ("!!",), packed({"x": b"no crg"})):
-        with pytest.raises(ManeuverError, match=r"empty|damaged|no OpenCRG"):
+        with pytest.raises(ManeuverError, match=r"empty|damaged|not an OpenCRG"):
             unpacked(text)
 
 
@@ -266,7 +266,7 @@ def test_the_examples_of_asam_are_read() -> None:
     curved = grids["handmade_curved_banked_sloped.crg"]
     assert curved.z_m[5, 6] == pytest.approx(0.011 + 0.022 + 0.033 + 0.044 + 0.0111111)
     assert np.array_equal(curved.z_m, grids["fileref_opts.crg"].z_m)
-    with pytest.raises(ManeuverError, match="not found beside it"):
+    with pytest.raises(ManeuverError, match="not found next to it"):
         resolve(table(missing.name))
     with pytest.raises(ManeuverError, match="lost or gained bytes"):
         resolve(table(damaged.name))

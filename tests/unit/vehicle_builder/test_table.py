@@ -86,7 +86,7 @@ def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
     [
         ("spring_rate_Npm = 24730", "spring_rate_Npm = 24.2", "is it in N/mm? then write 24200"),
         ("cg_height_m = 0.545", "cg_height_m = 545", "is it in mm? then write 0.545"),
-        ("rack_limit_m = 0.064", "rack_limit_m = 0.0064", "is no value of a road car"),
+        ("rack_limit_m = 0.064", "rack_limit_m = 0.0064", "is not a value of a road car"),
     ],
 )
 def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: str) -> None:

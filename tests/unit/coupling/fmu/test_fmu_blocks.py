@@ -91,10 +91,10 @@ def test_a_map_names_signal_and_unit(fmus, tmp_path):
     assert command.rear_steer_demand_rad == pytest.approx(0.006)
     for text, said in (
         ('yaw_rate = { signal = "yawrate" }', "line 1: yaw_rate.signal: .* did you mean 'yaw_rate_radps'"),
-        ('yaw_rate = { unit = "deg/h" }', "'deg/h' is no known unit"),
+        ('yaw_rate = { unit = "deg/h" }', "'deg/h' is not a known unit"),
         ('yaw_rate = { unit = "m" }', "is in m, but yaw_rate_radps is in rad/s"),
         ('yaw = { unit = "deg" }', "has no input or output 'yaw'; did you mean 'yaw_rate'"),
-        ('yaw_rate = { signal = "wheel_torques" }', "wheel_torques is no number"),
+        ('yaw_rate = { signal = "wheel_torques" }', "wheel_torques is not a number"),
         ("yaw_rate = 3", "write yaw_rate = "),
     ):
         toml.write_text(text)
@@ -107,7 +107,7 @@ def test_a_path_is_no_signal_of_an_fmu(fmus, tmp_path):
         fmus / "yaw_damper_fmi2.fmu", tmp_path / "d.fmu", [("rear_steer_demand_rad", "steering_wheel_demand_rad")]
     )
     (tmp_path / "d.toml").write_text('yaw_rate_radps = { signal = "path" }')
-    with pytest.raises(DriverError, match="path is no number"):
+    with pytest.raises(DriverError, match="path is not a number"):
         driver_spec(fmu)
 
 
@@ -195,7 +195,7 @@ def test_an_isolated_fmu_may_crash_or_hang(fmus, fault, said):
 @pytest.mark.parametrize(
     ("edits", "left_out", "said"),
     [
-        ([("guid='[^']*'", "guid='other'")], "", "refuses to be instantiated .*token other"),
+        ([("guid='[^']*'", "guid='other'")], "", "cannot be instantiated .*token other"),
         ([], "binaries", "has no binary for Linux on x86-64 .*; it has none"),
         ([("<CoSimulation", "<ModelExchange")], "", "modelDescription.xml is invalid"),
         ([("fmiVersion='2.0'", "fmiVersion='1.5'")], "", "is invalid|has FMI"),

@@ -45,7 +45,7 @@ def test_a_factor_follows_an_earlier_one() -> None:
     values = FactorValues(read_study(table(**factors)))
     # The order of the sample does not count, that of the file does.
     assert values.overrides(0, 0, {"speed_kmh": 100.0, "road.mu": 0.5})["speed_kmh"] == pytest.approx(50.0)
-    with pytest.raises(StudyError, match="no earlier factor"):
+    with pytest.raises(StudyError, match="not an earlier factor"):
         FactorValues(read_study(table(**dict(reversed(factors.items())))))
 
 

@@ -34,7 +34,7 @@ def test_a_folder_keeps_its_study_and_removed_options_name_their_successor(tmp_p
     assert "give a study file instead" in capsys.readouterr().err
     for words, told in (
         (["study", "population", "-o", "p", "--samples", "0"], "0"),
-        (["study", "population", "--status", "-c", "ars"], "drive nothing"),
+        (["study", "population", "--status", "-c", "ars"], "drive no runs"),
     ):
         assert main(words) != 0
         assert told in capsys.readouterr().err
