@@ -79,7 +79,7 @@ class DriverError(ActiveSteerError):
 
 
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
-    """A non-finite state or a warning of the engine, with the recording so far."""
+    """A state is not finite, or the engine raises a warning. The error holds the recording so far."""
 
 
 class RecordingError(ActiveSteerError):

@@ -216,7 +216,7 @@ def numbers(text: str) -> list[float]:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the parameters that `--overrides` and `--set` replace, with values as in TOML or else as texts."""
+    """Return the overrides of `--overrides` and `--set`. Values that are not TOML are texts."""
     from activesteer.config import parse_value, read_toml
 
     values = dict(given or {})

@@ -49,7 +49,7 @@ def print_json(value: Any, *, one_line: bool = False) -> None:
 def tell(
     options: argparse.Namespace, values: Any, lines: Iterable[str], files: Iterable[Path] = (), word: str = "figure"
 ) -> None:
-    """Print values with `--json`, else lines, and a line for each written file."""
+    """Print values as JSON with `--json`. Otherwise print lines, and a line for each written file."""
     if options.json:
         print_json(values)
         return

@@ -70,7 +70,7 @@ class Source:
         )
 
     def placed(self, path: Sequence[str], reason: ActiveSteerError) -> ActiveSteerError:
-        """Return the error of a check with the place in the file, which the check does not know."""
+        """Return the error of a check with its place in the file added."""
         inner = reason.key.split(".") if reason.key else ()
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
@@ -107,7 +107,7 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
 
 
 def find_file(name: str, folders: Sequence[Path], pattern: str, source: Source, key: Sequence[str]) -> Path:
-    """Find a file that a key names, in one of the folders or by its own path.
+    """Find a file that a key names, by its path or in one of the folders.
 
     The error lists the files of the last folder, or of the working directory, that match a pattern.
     """
@@ -213,7 +213,7 @@ def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
 
 
 def dataclass_in(hint: Any) -> type | None:
-    """Return the dataclass of a table that a field holds, possibly an optional one, or None for other fields."""
+    """Return the dataclass of the table that a field holds, even if optional, or None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None

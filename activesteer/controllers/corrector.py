@@ -83,7 +83,7 @@ class Corrector(NativeBlock):
         return corrected(self, error_radps, saturated)
 
     def reset(self) -> None:
-        """Reset integral and derivative, as while active steering is inactive."""
+        """Reset integral and derivative, for example while active steering is inactive."""
         reset(self)
 
 

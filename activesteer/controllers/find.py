@@ -1,4 +1,4 @@
-"""Find a controller by name, or a user's own."""
+"""Search for a controller by name, or in a user's file."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def file_gains(name: str, gains: type[T]) -> T:
 
 @dataclass(frozen=True)
 class SideslipRearSteerParameters:
-    """Rear steering with a sideslip term (`ars_sideslip`), in addition to the gains of [controllers.ars]."""
+    """Gains of the rear steering with a sideslip term (`ars_sideslip`), in addition to [controllers.ars]."""
 
     sideslip_gain: _Gain
     """Rear angle against the sideslip angle [rad/rad]: share by which the rear axle becomes stiffer against
@@ -44,7 +44,7 @@ class SideslipRearSteerParameters:
 
 @dataclass(frozen=True)
 class LqrParameters:
-    """Both axles by a linear-quadratic regulator (`lqr`).
+    """Gains and limits of the linear-quadratic regulator for both axles (`lqr`).
 
     A yaw rate error, a sideslip angle and two angles, each as large as its scale, cost the same.
     """
@@ -87,7 +87,7 @@ class LqrParameters:
 
 @dataclass(frozen=True)
 class YawMomentParameters:
-    """Desired yaw rate, and the yaw moment for its error and for the sideslip angle."""
+    """Parameters of the desired yaw rate, and of the yaw moment for its error and for the sideslip angle."""
 
     sideslip_limit_rad: _Limit
     """Sideslip angle that causes no action [rad]."""
@@ -108,7 +108,7 @@ class YawMomentParameters:
 
 @dataclass(frozen=True)
 class EscParameters(YawMomentParameters):
-    """Stability control by the brakes (`esc`)."""
+    """Parameters of the stability control by the brakes (`esc`)."""
 
     yaw_rate_band_radps: _Gain
     """Yaw rate error that causes no action [rad/s]."""
@@ -120,7 +120,7 @@ class EscParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class TorqueVectoringParameters(YawMomentParameters):
-    """Torque vectoring by electric axles (`tv`)."""
+    """Parameters of the torque vectoring by electric axles (`tv`)."""
 
     least_fraction: _Fraction
     """Fraction of the friction that stays for the torque in a turn at the limit [-]."""
@@ -130,7 +130,7 @@ class TorqueVectoringParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Brakes that add what the steering of `lqr` cannot provide (`integrated`); see also [controllers.lqr].
+    """Parameters of the brakes that assist the steering of `lqr` (`integrated`); see also [controllers.lqr].
 
     A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """
@@ -169,7 +169,7 @@ _Rate = Annotated[float, Range(0.01, 100.0)]
 
 @dataclass(frozen=True)
 class DesiredYawRateParameters:
-    """Desired yaw rate for the driver's demand (eqs. 3 and 6)."""
+    """Parameters of the desired yaw rate for the driver's demand (eqs. 3 and 6)."""
 
     max_lateral_acceleration_mps2: Annotated[float, Range(0.1, 20.0)] = 8.0
     """a_y_max: the desired yaw rate stays below a_y_max / v. The controllers assume this value on every road, because
@@ -180,7 +180,7 @@ class DesiredYawRateParameters:
 
 @dataclass(frozen=True)
 class CorrectorParameters:
-    """Tolerance band and PID corrector on the yaw rate error, of which the paper has only the P part."""
+    """Parameters of tolerance band and PID corrector on the yaw rate error. The paper has only the P part."""
 
     deadband_start_radps: _NotNegative = math.radians(0.5)
     """c_off: below this error there is no action [rad/s]."""
@@ -198,7 +198,7 @@ class CorrectorParameters:
 
 @dataclass(frozen=True)
 class RearSteerParameters:
-    """Active rear steering (ARS)."""
+    """Gains and limits of active rear steering (ARS)."""
 
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
@@ -210,7 +210,7 @@ class RearSteerParameters:
 
 @dataclass(frozen=True)
 class FrontSuperpositionParameters:
-    """Active front steering by superposition (AFS)."""
+    """Gains and limits of active front steering by superposition (AFS)."""
 
     corrector: CorrectorParameters = CorrectorParameters()
     """Feedback of the yaw rate."""
@@ -220,7 +220,7 @@ class FrontSuperpositionParameters:
 
 @dataclass(frozen=True)
 class ServoParameters:
-    """The actuators of both axles as `lqr` and `integrated` know them, with angles at the road wheels."""
+    """Properties of the actuators of both axles for `lqr` and `integrated`, with angles at the road wheels."""
 
     lag_s: _Lag = 0.025
     """Lag of both actuators [s]."""
@@ -272,7 +272,7 @@ class ControllerParameters:
 
 
 class SplitAxle(NamedTuple):
-    """An electric axle whose left and right torques can differ, as controllers know it.
+    """Properties of an electric axle whose left and right torques can differ, for controllers.
 
     Attributes:
         place: Its left wheel in the order of `CORNERS`: 0 in front, 2 at the rear.

@@ -1,4 +1,4 @@
-"""The controllers that come with the package.
+"""Registry of the controllers that come with the package.
 
 A registered class has the method `step` of `Controller` and is made from a `ControllerSetup`. Its attributes say
 

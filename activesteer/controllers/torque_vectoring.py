@@ -51,7 +51,7 @@ _LEAST_RADPS: Final = 1.0
 
 
 class Range(NamedTuple):
-    """Differences that an axle can make, right less left.
+    """Range of the torque difference of an axle, right minus left.
 
     Attributes:
         place: Its left wheel, 0 or 2.
@@ -82,7 +82,7 @@ class Range(NamedTuple):
 
 
 def _left_by(slip: float) -> float:
-    """Return the fraction of a torque that is left for a wheel that already slips in the direction of the torque."""
+    """Return the fraction of a torque that remains for a wheel that already slips in the torque's direction."""
     return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
 
 

@@ -162,7 +162,7 @@ def read_text(
     error: type[ActiveSteerError],
     max_bytes: int = limits.MAX_TEXT_BYTES,
 ) -> str:
-    """Read a text file in UTF-8 as by `read_bytes`, with normalised line ends and without a byte order mark."""
+    """Read a UTF-8 text file like `read_bytes`, with normalised line ends and without a byte order mark."""
     try:
         text = read_bytes(path, error, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError as reason:

@@ -144,14 +144,14 @@ def fail(key: str, problem: str) -> RecordingError:
 
 
 def table_of(value: object, key: str) -> Mapping[str, Any]:
-    """Return the value if it is a table, else raise."""
+    """Return the value if it is a table, or raise an error."""
     if not isinstance(value, Mapping):
         raise fail(key, f"is {shown(value)}, expected a table")
     return value
 
 
 def sequence(value: object, key: str) -> Sequence[Any]:
-    """Return the value if it is a list, else raise."""
+    """Return the value if it is a list, or raise an error."""
     if not isinstance(value, list | tuple):
         raise fail(key, f"is {shown(value)}, expected a list")
     check_count(len(value), MAX_LIST_ELEMENTS, "elements", RecordingError, file="the metadata", key=key)
@@ -159,7 +159,7 @@ def sequence(value: object, key: str) -> Sequence[Any]:
 
 
 def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M) -> float:
-    """Return the value [m] if it is a number from `low` to `high`, else raise."""
+    """Return the value [m] if it is a number from `low` to `high`, or raise an error."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise fail(key, f"is {shown(value)}, expected a number from {low:g} to {high:g} m")
     return float(value)
@@ -178,7 +178,7 @@ def numbers(
 
 
 def text(value: object, key: str) -> str:
-    """Return the value if it is a text, else raise."""
+    """Return the value if it is a text, or raise an error."""
     if not isinstance(value, str):
         raise fail(key, f"is {shown(value)}, expected a text")
     return value

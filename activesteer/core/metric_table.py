@@ -87,7 +87,7 @@ class Metric(NamedTuple):
         return self.form is not Form.NUMBER
 
     def text(self, value: float) -> str:
-        """Return a value [SI] as tables show it, `-` for nan."""
+        """Return a value [SI] in the form of the tables, with `-` for nan."""
         if math.isnan(value):
             return "-"
         if self.form is Form.YES_OR_NO:

@@ -23,7 +23,7 @@ _FINE: Final = 20
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Points at equal distances along a curve, continued straight beyond both ends.
+    """Path through points at equal distances, continued straight beyond both ends.
 
     Attributes:
         s_m: Arc length [m], from 0, shape (n,).

@@ -30,7 +30,7 @@ _MOST_WAITING: Final = 1000
 
 
 class UdpPort(NamedTuple):
-    """Address that commands come from.
+    """Address from which commands come.
 
     Attributes:
         port: Port of the run.
@@ -105,7 +105,7 @@ class UdpLink:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Address and port that the run listens on."""
+        """Address and port on which the run listens."""
         return self._socket.getsockname()
 
     def connect(self, check: Callable[[Commands, str], Commands]) -> None:

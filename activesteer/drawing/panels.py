@@ -1,4 +1,4 @@
-"""The panels over time: their curves, and the views that show them."""
+"""Panels of signals over time: their curves, and the views that show them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Line(NamedTuple):
     views: tuple[str, ...] = _EVERYWHERE  # views that draw the line
 
     def of(self, recording: Channels) -> Array | None:
-        """Return the values of a run [SI], or None if they have no meaning."""
+        """Return the values of a run [SI], or None if they are not meaningful."""
         if self.beside and not _holds(recording, self.beside):
             return None
         values = drawn_values(recording, self.channel)

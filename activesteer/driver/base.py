@@ -13,7 +13,7 @@ from activesteer.theory.single_track import SingleTrackParameters
 
 @dataclass(frozen=True, kw_only=True)
 class DriverParameters:
-    """Steering along a path, and speed control, of a driver in any car."""
+    """Parameters of a driver in any car: steering along a path, and speed control."""
 
     name: str = ""
     """Short name, for tables. Default: the file's name."""
@@ -84,7 +84,7 @@ class Driver(Protocol):
 
 
 class Drivetrain(Protocol):
-    """Engine and gearbox as a driver knows them."""
+    """Engine and gearbox in the form that a driver knows."""
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
         """Return the mean speed of the driven wheels, which turns the engine [rad/s]."""

@@ -1,4 +1,4 @@
-"""The human driver, in Python and in compiled code, and the look-up of drivers, including a user's own."""
+"""The human driver, in Python and in compiled code, and the search for drivers."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | N
 
 
 class SharedTables:
-    """Setpoints of manoeuvres over the next steps, for cars that are driven together."""
+    """Setpoints of manoeuvres over the next steps, for cars that are driven in a batch."""
 
     def __init__(self) -> None:
         """Start without tables."""
@@ -269,7 +269,7 @@ DRIVER: Final = _DriverKind(
 
 
 def driver_spec(given: Any) -> Plugin:
-    """Find a driver (see `activesteer.plugins.find`).
+    """Find a driver by its name, its file or its code (see `activesteer.plugins.find`).
 
     Args:
         given: A name from `list_drivers`, a driver file or its table; or a user's own code:

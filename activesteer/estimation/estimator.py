@@ -67,7 +67,7 @@ class Estimator(NativeBlock):
 
     @property
     def rate_innovation(self) -> float:
-        """Squared error of only the last measured yaw rate, over its expected variance."""
+        """Squared error of the last measured yaw rate only, over its expected variance."""
         return float(self._memory["rate_innovation"][0])
 
     def step(self, measurement: Measurement) -> Estimate:

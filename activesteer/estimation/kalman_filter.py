@@ -179,7 +179,7 @@ def _forget(known, memory, duration_s, moved, slope, added):
 
 @compiled
 def _add_noise(known, tyres, memory, duration_s, added):
-    """Process noise covariance of the motion over an interval."""
+    """Write the process noise covariance of the motion over an interval into `added`."""
     front_N, rear_N = forces_of(known, tyres, memory, memory.state)
     front, rear = _force_errors(known, front_N, rear_N)
     # An error that lasts for a time acts like white noise of twice this time.

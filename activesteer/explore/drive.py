@@ -1,4 +1,4 @@
-"""A car driven by hand in real time: courses, the hands at its wheel and pedals, and the drive itself."""
+"""A car driven by hand in real time: courses, inputs of steering wheel and pedals, and the drive itself."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ COURSES: Final = {
 
 
 class HandDriver:
-    """A driver with the hands and feet of a person at the page.
+    """A driver that follows the steering and pedal inputs of a person at the page.
 
     The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
     at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on
@@ -83,7 +83,7 @@ class HandDriver:
         return min(self._setup.steering_ratio * turn, self._setup.steering_wheel_limit_rad)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Move hands and feet by one step."""
+        """Advance the inputs of hands and feet by one step."""
         step_s, hands = self._setup.timestep_s, self.hands
         target = (hands.steer or 0.0) * self.full_turn_rad(measurement.speed_mps)
         self._angle_rad = _towards(self._angle_rad, target, _HANDS_RADPS * step_s)

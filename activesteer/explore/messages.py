@@ -26,7 +26,7 @@ _Friction = Annotated[float, Meta(ge=0.1, le=1.2)]
 
 
 class Choice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind"):
-    """A run, or a drive by hand, as the page chose it."""
+    """Choice of the page for a run or a drive by hand."""
 
     id: _Number = 0  # number that the replies repeat
     maneuver: _Name  # manoeuvre, or course of a drive

@@ -114,7 +114,7 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
-    """Yield sliders of the positive numbers in a file, from half of each to its double."""
+    """Yield sliders of the positive numbers in a file, from half to twice each number."""
     table = tomllib.loads(file.read_text("utf-8"))
     for path, given in leaves(table).items():
         key = ".".join(path)
@@ -331,7 +331,7 @@ class Runs:
         return found, " (amplitude as before, until you let go)" if held else ""
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
-        """Return the recording of a run, or None if a newer choice has come."""
+        """Return the recording of a run, or None if a newer choice has arrived."""
         if stale():
             return None
         simulation = Simulation(scenario, controller)

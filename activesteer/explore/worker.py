@@ -110,12 +110,12 @@ class _Worker:
             self._send(Reply({**ended.header, "error": _words(error)}))
 
     def _stale(self) -> bool:
-        """Return whether a newer choice waits."""
+        """Return True if a newer choice is waiting."""
         self._receive(wait=False)
         return any(isinstance(message, (RunRequest, Start)) for message in self._waiting)
 
     def _receive(self, *, wait: bool) -> None:
-        """Take all messages that have come."""
+        """Receive all waiting messages."""
         while wait or self._connection.poll():
             add(self._waiting, self._connection.recv())
             wait = False

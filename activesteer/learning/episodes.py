@@ -192,7 +192,7 @@ class Episodes:
         overrides: Mapping[str, Any] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Build the cars.
+        """Build the cars of all episodes.
 
         Args:
             task: Name of a task, or your own.
@@ -257,7 +257,7 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Start some episodes anew, each with a car that its generator draws, and return all observations."""
+        """Restart some episodes, each with a car that its generator draws, and return all observations."""
         for episode, generator in zip(episodes, generators, strict=True):
             self._active[episode] = episode * self._cars + int(generator.integers(self._cars))
         cars = self._active[list(episodes)]
@@ -268,7 +268,7 @@ class Episodes:
 
     @property
     def active(self) -> NDArray[np.intp]:
-        """Number of the car that drives in each episode, among the cars of that episode."""
+        """Index of the car that drives in each episode, within the cars of that episode."""
         return self._active % self._cars
 
     def loop(self, episode: int) -> Any:

@@ -182,7 +182,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
         return Course(path, width_m=self._along(path, self.path.width_m))
 
     def _along(self, path: Path, values: tuple[float, ...] | None) -> Array | None:
-        """Return values at the points of the path, from those at the given points."""
+        """Interpolate values at the given points to the points of the path."""
         if values is None:
             return None
         chords = np.hypot(np.diff(self.path.x_m or ()), np.diff(self.path.y_m or ()))

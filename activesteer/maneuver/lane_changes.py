@@ -90,7 +90,7 @@ class AlongCourse(Maneuver):
 
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """Return the vehicle width that the course is laid out for [m]."""
+    """Return the vehicle width for which the course is laid out [m]."""
     if vehicle_width_m is None:
         raise ManeuverError(
             "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"

@@ -33,7 +33,7 @@ class SteeringTable:
     """Time by which the column comes later, for a recorded signal with a separate clock [s]."""
 
     def __post_init__(self) -> None:
-        """Check that times come with one of the two columns, and that factor and delay act on it."""
+        """Check that times come with exactly one angle column, and that factor and delay have an effect."""
         if self.steering_wheel_rad is not None and self.rack_m is not None:
             raise ManeuverError("steering_wheel_rad and rack_m both steer the front wheels; leave one out")
         if self.steering_wheel_rad is None and self.rack_m is None:

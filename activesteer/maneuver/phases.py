@@ -26,7 +26,7 @@ _SENSES: Final = ("above", "below", "within")
 
 
 class Seen(NamedTuple):
-    """State of the car that ends a phase."""
+    """State of the car on which the end of a phase depends."""
 
     yaw_rate_radps: float  # left positive
     roll_rate_radps: float  # positive when the left side rises

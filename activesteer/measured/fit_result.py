@@ -50,7 +50,7 @@ def autocorrelation_time(values: Array) -> float:
 def intervals(
     series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool
 ) -> tuple[Array, Array, tuple[float, ...], float]:
-    """Return the uncertainty of the parameters, relative to their ranges, in the linear neighbourhood of the solution.
+    """Return the uncertainty of the parameters, relative to their ranges, by linearisation at the solution.
 
     That is half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at
     an end of its range; the number of independent samples of each series; and the degrees of freedom of the t

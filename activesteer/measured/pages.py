@@ -251,7 +251,7 @@ def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
 
 
 def overrides_text(found: Fit, name: str) -> str:
-    """Return the file for `--overrides`: values that hold in all recordings, and as comments those of only one."""
+    """Return the file for `--overrides`. Values that hold in only one recording are comments."""
     words = {one.key: one.words if one.value == found.overrides.get(one.key) else f"{one.words}, relative to the files"
              for one in found.parameters}  # fmt: skip
     lines = [f"# Found by `activesteer fit {name}.toml`; for --overrides, or the table [overrides] of a study."]

@@ -208,7 +208,7 @@ def content_key(source: Path) -> str:
 
 @functools.cache
 def _sources_key(source: Path) -> str:
-    """Return the digest of all sources behind a file, including its own."""
+    """Return the digest of all sources that a file depends on, including the file."""
     package = source.parent
     while (package.parent / "__init__.py").is_file():
         package = package.parent

@@ -153,7 +153,7 @@ class Table(NamedTuple):
 
     @property
     def cards(self) -> bool:
-        """True if a phone shows each row as a card, because the table is too wide for it."""
+        """True if a phone shows each row as a card, because the table is too wide."""
         if self.kind == "contents":  # its rows belong together
             return False
         cells = [_plain(cell) for row in self.rows for cell in row]

@@ -191,7 +191,7 @@ def _flat(points: Array) -> Array:
 
 
 def map_bounds(runs: Sequence[ReplayedRun]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the ranges of both map axes that show everything [m]."""
+    """Return the ranges of both map axes that contain all cars and the course [m]."""
     around = extent(runs)
     x = (around.low_x_m - _MAP_MARGIN_M, around.high_x_m + _MAP_MARGIN_M)
     return x, (-around.high_y_m - _MAP_MARGIN_M, -around.low_y_m + _MAP_MARGIN_M)

@@ -172,7 +172,7 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
 
 
 def _words(error: BaseException) -> str:
-    """Return class and text of an error, although the text comes from foreign code that may fail too."""
+    """Return class and text of an error from foreign code, even if making the text fails too."""
     name = type(error).__name__
     try:
         return f"{name}: {error}".removesuffix(": ")

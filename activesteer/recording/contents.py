@@ -264,7 +264,7 @@ LIBRARY = "activesteer "
 
 
 def is_recording_start(data: bytes) -> bool:
-    """Return whether a file with this start is ours, even if damaged or left empty by a full disk."""
+    """Return whether a file with this start is a recording of ours, even if it is damaged or empty."""
     # Magic, opcode, length of the record, then two texts with their lengths: profile and library.
     start = len(MCAP0_MAGIC) + 9
     head = MCAP0_MAGIC + bytes([Opcode.HEADER])

@@ -89,7 +89,7 @@ class Scenario:
         return hashlib.sha256(json.dumps(describe(self), sort_keys=True, default=str).encode()).hexdigest()
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
-        """Return the properties of the car that controllers may know."""
+        """Return the properties of the car that controllers may use."""
         car, replaced = self.car.config, frozenset(map(".".join, gain_paths(self.overrides).values()))
         return ControllerSetup(
             car.single_track, car.controllers, car.steering.ratio, timestep_s, replaced, estimator_setup(self.car),
@@ -99,7 +99,7 @@ class Scenario:
     def driver_setup(
         self, timestep_s: float, rack_per_steering_wheel_m: float | None, wheel_radius_m: float
     ) -> DriverSetup:
-        """Return the properties of the car that drivers may know."""
+        """Return the properties of the car that drivers may use."""
         car = self.car.config
         return DriverSetup(
             car.single_track, self.driver.parameters, car.steering.ratio, car.steering.steering_wheel_limit_rad,
@@ -193,7 +193,7 @@ _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
 
 
 def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:
-    """Return the manoeuvre with the driven values in its title, where the title of its file says them."""
+    """Return the manoeuvre with the driven values in its title, if the title of its file contains them."""
     title = built.title
     if title != of_file.get("title"):
         return built

@@ -165,7 +165,7 @@ class SensorBlock:
         self.outputs = self.memory[: len(MEASURED)]
 
     def reset(self, truth: Measurement) -> None:
-        """Start anew, as if the truth had been constant for a long time."""
+        """Reset the sensors, as if the truth had been constant for a long time."""
         self.memory[:] = 0.0
         self.say(truth)
         for chain, value in zip(self.chains, self.outputs[1:], strict=True):

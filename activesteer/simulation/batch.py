@@ -1,4 +1,4 @@
-"""Many cars at once: each with its own numbers, driven by one native call without Python's lock."""
+"""Batch of many cars, each with its own numbers, driven by one native call without Python's lock."""
 
 from __future__ import annotations
 
@@ -263,7 +263,7 @@ class Batch(Copyable):
         return self.measurement
 
     def _call(self, records: NDArray[Any]) -> None:
-        """Drive all cars natively, divided among the threads by the steps up to their next stop."""
+        """Drive all cars natively, with an equal share of the next steps for each thread."""
         in_python = np.zeros(len(records), dtype=bool)
         for block in ("driver", "controller"):
             in_python |= (records[f"{block}_kind"] == PYTHON) & (records[f"{block}_given"] == 0)

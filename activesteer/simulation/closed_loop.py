@@ -180,7 +180,7 @@ class ClosedLoop(Uncopyable):
             self.restore_state(settled)
 
     def join(self, records: NDArray[Any], place: int, tables: SharedTables) -> None:
-        """Move the record of the car to a place among those that are driven together, which share tables."""
+        """Move the record of the car to a place in the records of a batch, whose cars share tables."""
         records[place] = self._record[0]
         self._record = record = records[place : place + 1]
         self._tables = tables
@@ -228,7 +228,7 @@ class ClosedLoop(Uncopyable):
         self.blocks = self.blocks[0], controller
 
     def replace_controller(self, controller: Any) -> None:
-        """Let another controller take over, with a separate control unit (see `activesteer.plugins.find`).
+        """Replace the controller by another one with a new control unit (see `activesteer.plugins.find`).
 
         Raises:
             ControllerError: there is no such controller, or it cannot be created.

@@ -1,4 +1,4 @@
-"""A drive in a window: the simulation at the pace of a clock, and the scene that shows it."""
+"""Drive in a window: the simulation at the pace of a clock, and the scene that shows it."""
 
 from __future__ import annotations
 

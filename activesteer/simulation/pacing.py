@@ -1,4 +1,4 @@
-"""Pace of a run by the clock: each step begins at its own time, and its delay is kept."""
+"""Pace of a run by the clock: each step begins at its own time, and delays are recorded."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _TAPE_ROWS: Final = 125
 
 @dataclass
 class _Kept:
-    """Rows and poses in memory, the first `referred_rows` of which are in use elsewhere and never overwritten."""
+    """Rows and poses in memory. The first `referred_rows` are shared and never overwritten."""
 
     values: NDArray[np.float64]
     positions_m: NDArray[np.float64]

@@ -46,7 +46,7 @@ def control_unit(
 
 
 def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) -> ControllerSetup:
-    """Tell the controller the rates of slower actuators than those in its table, unless an override sets them."""
+    """Give the controller the rates of slower actuators, unless an override sets these rates."""
     rates, servos, gains = steering_rates(vehicle.model, scenario.car.config), setup.gains.servos, setup.gains
     slower = {
         name: rate_radps

@@ -198,7 +198,7 @@ class Simulation(Copyable):
     def advance(
         self, steps: int, driver_command: DriverCommand | None = None, actuator_command: ActuatorCommand | None = None
     ) -> Measurement:
-        """Drive a number of steps.
+        """Drive a number of steps, by the blocks or by given commands.
 
         If you supply a command, the block it replaces is not called and its state is frozen.
 

@@ -161,7 +161,7 @@ def _through_centre(runs: list[StandardRun]) -> dict[str, Array]:
 
 
 def transition_lines(signals: Signals) -> list[dict[str, Any]]:
-    """Return the slopes of the car's response at the centre, and the lines of the hand torque off the centre."""
+    """Return the slopes of the car's response at the centre, and the lines of the hand torque outside of it."""
     ay = signals["ay_mps2"]
     near = np.abs(ay) <= _CENTRE_MPS2
     found = []

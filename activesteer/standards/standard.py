@@ -81,7 +81,7 @@ class StandardRun:
 
 @dataclass
 class StandardRunner:
-    """A car with a controller and a driver, whose series of runs share one set of workers."""
+    """Runner of a standard's tests: a car, a controller, a driver, and one set of workers."""
 
     standard: str
     vehicle: FileOrTable  # name, path or table of the vehicle

@@ -130,7 +130,7 @@ class _KeptInputs:
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
-        """Return the time of only the engine per step of the same drive [us], all in one native call."""
+        """Return the engine's time per step of the same drive, without our Python code, in one native call [us]."""
         self.vehicle.restore_state(self._start)
         return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 

@@ -50,7 +50,7 @@ class Reproduction:
 
     @property
     def exit_status(self) -> int:
-        """0 if every run is complete and every claim passed or is known not to be reproduced, else 1."""
+        """Exit status: 0 if all runs are complete and each claim passed or is listed as not reproduced, else 1."""
         return 1 if self.failures else self.scorecard.exit_status
 
     def recordings(self) -> dict[str, dict[str, Recording]]:

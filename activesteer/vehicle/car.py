@@ -83,7 +83,7 @@ class Vehicle(Uncopyable):
         timestep_s: float = DEFAULT_TIMESTEP_S,
         content: Mapping[str, bytes] | None = None,
     ) -> None:
-        """Compile the car, put it at rest in static equilibrium and install the native forces.
+        """Compile the car, put it into static equilibrium and install the native forces.
 
         Args:
             mjcf: The model file.
@@ -449,7 +449,7 @@ class Vehicle(Uncopyable):
             record[...] = np.array(area, fb.AREA)
 
     def limit_hands(self, torque_Nm: float | None) -> None:
-        """Limit the torque of the hands on the steering wheel [N m], or None for no limit."""
+        """Limit the torque of the hands on the steering wheel [N m]. None removes the limit."""
         hands, felt = self._hands, 1.0 - self.parameters.steering.assist_fraction
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt

@@ -258,7 +258,7 @@ STOP_BEYOND: Final = 1.03
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear, with defaults of the preset, and without effect with the model's own actuator."""
+    """A motor behind a gear, with the preset's value for each missing key."""
 
     TABLE: ClassVar[str]
     """Table of the vehicle file, and of the presets."""

@@ -94,7 +94,7 @@ class Faults:
 
 
 class _Acting:
-    """A fault in a car, which acts from step `begins` up to `ends`, and listens to the demands from `listens` on.
+    """A fault in a car that acts from step `begins` to `ends`, and stores demands from step `listens` on.
 
     `delay`: steps by which it delays demands or readings. `memory`: the last of them, see `native_faults.FAULT`.
     """
@@ -123,7 +123,7 @@ class _Acting:
         record["memory"], record["capacity"] = self.memory.ctypes.data, self._capacity
 
     def turn(self, step: int) -> None:
-        """Let the fault listen or act in every step from this one on, if it does so."""
+        """Set whether the fault is idle, stores demands or acts from this step on."""
         listens = self._watches and self.listens <= step < self.ends
         self._own["state"] = (native.ACTS if self.begins <= step else native.LISTENS) if listens else native.IDLE
 

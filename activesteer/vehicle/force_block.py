@@ -316,7 +316,7 @@ def pack(header: NDArray[Any], sections: Mapping[str, list[NDArray[Any]]]) -> ND
 
 
 def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
-    """Return the block as it goes into the model, for the index of its start in `numeric_data`."""
+    """Return the block with its trailer, for the index of its start in `numeric_data`."""
     return np.concatenate([block, (float(start), MARKER)])
 
 

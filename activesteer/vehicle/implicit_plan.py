@@ -153,7 +153,7 @@ _HANDED_OVER: Final[dict[str, Callable[[mujoco.MjModel], Any]]] = {
 
 
 def handed_over(model: mujoco.MjModel) -> list[str]:
-    """Return the features of a model that need the engine's own step, or empty if the direct solution steps."""
+    """Return the features of a model that need the engine's own step, or empty if there are none."""
     found = [name for name, has in _HANDED_OVER.items() if has(model)]
     return found if mujoco.get_mjcb_control() is None else [*found, "mjcb_control"]
 
@@ -308,7 +308,7 @@ def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _sensed_body(model: mujoco.MjModel) -> int:
-    """Return the only body with sensed acceleration, if its parent is the world and no force is sensed, or else 0."""
+    """Return the body with the only sensed acceleration, or 0 if the sensors need more than this body."""
     late = np.flatnonzero(model.sensor_needstage == int(mujoco.mjtStage.mjSTAGE_ACC))
     if (model.sensor_type[late] != int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)).any():
         return 0

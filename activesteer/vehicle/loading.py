@@ -197,7 +197,7 @@ def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
 
 def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, float]:
-    """Return force [N] and stiffness [N/m] of the dry friction that an actuator stands for."""
+    """Return force [N] and stiffness [N/m] of the dry friction that an actuator represents."""
     friction = parameters.friction
     if actuator == "rack_friction":
         return friction.rack_N, friction.rack_stiffness_Npm

@@ -1,4 +1,4 @@
-"""Faults in compiled code: of actuators, demands that come late, and wrong readings of sensors."""
+"""Faults in compiled code: of actuators, delayed demands, and wrong readings of sensors."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def keep(memory, capacity, value):
 
 @inlined
 def give_late(address, count):
-    """Give each part whose demands come late its demand, before a step."""
+    """Write the delayed demand of each part with such a fault, before a step."""
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state == ACTS:
@@ -63,7 +63,7 @@ def give_late(address, count):
 
 @inlined
 def keep_demands(address, count):
-    """Keep the demands that come late, after a step."""
+    """Store the demands of parts whose demands are delayed, after a step."""
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state != IDLE:
@@ -175,7 +175,7 @@ def set_fault(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def resume_part(part, act, qpos):
-    """Start a servo that was free at its current angle, from where it returns with its own lag and rate."""
+    """Start a servo that was free at its current angle. It returns with its own lag and rate."""
     if part.seized == 0:
         act[part.act] = qpos[part.qpos]
 

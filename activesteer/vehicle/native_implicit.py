@@ -47,7 +47,7 @@ def _engine(function, plan):
 
 @inlined
 def _engine_must(plan):
-    """Return True if only the engine's own step can act: a joint touches its limit, or a force acts on a body."""
+    """Return True if the step needs the engine: a joint touches its limit, or a force acts on a body."""
     if plan.direct == 0:
         return True
     limited, places = _indices(plan.limited), _indices(plan.limited_qpos)

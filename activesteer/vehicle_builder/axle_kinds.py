@@ -59,7 +59,7 @@ class AxleKind:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """All points that a table has to give, in the order of the messages."""
+        """All points that a table must give, in the order of the messages."""
         ends = [point for link in self.links for point in (link.inner, link.outer)]
         return tuple(dict.fromkeys((*self.points, *ends)))
 

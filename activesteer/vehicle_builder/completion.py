@@ -189,7 +189,7 @@ def complete(
 
 
 def pedal_of(motors: Motors) -> Powertrain:
-    """Return a powertrain whose pedal demands all that the motors can give."""
+    """Return a powertrain whose pedal demands the full torque of the motors."""
     front_Nm, rear_Nm = (sum(motor.wheel_torque_Nm for motor in motors.on(axle)) for axle in ("front", "rear"))
     return Powertrain(
         front_fraction=round(front_Nm / (front_Nm + rear_Nm), 3),

@@ -143,7 +143,7 @@ class AxleTable:
 
 @dataclass(frozen=True)
 class MassTable:
-    """Masses of the whole standing car with driver, or of only the chassis."""
+    """Masses of the whole car at rest with driver, or of only the chassis."""
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""
@@ -280,7 +280,7 @@ def _value(cell: str) -> float | str:
 
 
 def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = None) -> dict[str, AxleKind]:
-    """Return the suspension of each axle: the argument, else the kind in the table, else the default."""
+    """Return the suspension of each axle: from the argument, the table or the default."""
     chosen = {"front": front, "rear": rear}
     return {axle: kind_of(axle, chosen[axle] or table.axle(axle).type or DEFAULTS[axle]) for axle in ("front", "rear")}
 

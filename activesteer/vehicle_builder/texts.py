@@ -92,7 +92,7 @@ def _table(
 
 
 def _curves(car: CarDesign, trimmed: Trimmed) -> dict[str, Any]:
-    """Return the tables [curves.front] and [curves.rear], angles in degrees, or none if links guide both axles."""
+    """Return the tables [curves.front] and [curves.rear], angles in degrees, or nothing for axles of links."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}

@@ -1,4 +1,4 @@
-"""Trim: let the car stand, and adjust it until height, weight, ride and steering match the table.
+"""Adjustment of the standing car until height, weight, ride and steering match the table.
 
 A measured curve belongs to the loaded axle, the curve of the guide to the unloaded axle. They differ by a few
 hundredths of a degree, the effect of the wheel load at its small lever arms. The curves are corrected by the difference
@@ -39,7 +39,7 @@ from activesteer.vehicle_builder.design import Axle, CarDesign, Log, Solid, chas
 
 @dataclass
 class TrimmedAxle:
-    """One axle, with values of the left side."""
+    """Adjusted values of one axle, for the left side."""
 
     spring_rate_Npm: float = 25000.0
     spring_force_N: float = 4000.0  # spring force in the design position [N]

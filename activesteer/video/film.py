@@ -218,7 +218,7 @@ def check(path: Path, size: tuple[int, int]) -> None:
 
 
 def ffmpeg() -> str:
-    """Return the ffmpeg program of the package imageio-ffmpeg, or else of the system."""
+    """Return the ffmpeg program of the package imageio-ffmpeg, or the ffmpeg of the system."""
     with suppress(ImportError, RuntimeError):
         return importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     if found := shutil.which("ffmpeg"):

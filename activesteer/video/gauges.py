@@ -64,7 +64,7 @@ class Gauges:
     """Title and time of a frame, and a row of values for each run of its panes."""
 
     def __init__(self, panes: Dialled, title: str, size: tuple[int, int], note: str = "") -> None:
-        """Choose fonts and values."""
+        """Choose the fonts and the values of the gauges."""
         self._panes, self._title, self._note, self._size = panes, title, note, size
         self._every = [dial for pane in panes for dial in pane]
         lines = [line for panel in panels_in(FILM) for line in panel.lines_in(FILM)]

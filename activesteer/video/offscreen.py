@@ -30,7 +30,7 @@ _TRY_TIMEOUT_S: Final = 60.0
 
 @functools.cache
 def backend() -> str:
-    """Return the backend that MUJOCO_GL names, or else the first one that works.
+    """Return the backend that MUJOCO_GL names, or the first backend that works.
 
     Each backend is tried in a process of its own: a broken driver may end the process, and PyOpenGL cannot change its
     backend once it has loaded one.

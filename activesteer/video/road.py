@@ -79,7 +79,7 @@ def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None)
 
 
 def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray) -> None:
-    """Add a surface in bands of height, each with its colour: light and shade hardly show a slope of a few degrees."""
+    """Add a surface in bands of height with different colours, because shading hardly shows small slopes."""
     heights = corners[triangles, 2].mean(axis=1)
     width = max(_LEAST_BAND_M, float(np.abs(heights).max()) / _BANDS)
     bands = np.round(heights / width).astype(int)

@@ -150,7 +150,7 @@ class Scorecard:
 
     @property
     def exit_status(self) -> int:
-        """Exit status: 1 if a claim fails that is not listed, else 0."""
+        """Exit status: 1 if a claim fails without being listed as not reproduced, else 0."""
         return int(any(item.verdict is Verdict.FAILED for item in self.judged))
 
     def to_json(self) -> dict[str, Any]:

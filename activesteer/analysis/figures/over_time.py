@@ -75,7 +75,7 @@ def draw(
     axis: Axes, curve: DrawnRun, shown: Quantity, label: str = "", width: float = LINE_PT,
     style: LineStyle | None = None,
 ) -> None:  # fmt: skip
-    """Draw a channel of a run over time: without a label outside the legend, by default in the run's own style."""
+    """Draw a channel of a run over time. Without a label, the curve has no entry in the legend."""
     values = thinned(drawn_values(curve.recording, shown.channel)) * shown.factor
     # A leading underscore keeps a line out of the legend.
     axis.plot(
@@ -305,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times when a wheel stands on another friction than at the start, once for each run."""
+    """Shade the times when a wheel is on a different friction than at the start, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])

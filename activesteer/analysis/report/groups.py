@@ -80,7 +80,7 @@ class Group(NamedTuple):
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
-    """Open recordings by path, incomplete or damaged ones as far as they are readable."""
+    """Open recordings by path. Of incomplete or damaged recordings, open the readable part."""
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:

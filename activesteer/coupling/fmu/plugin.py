@@ -471,7 +471,7 @@ def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
 
 
 def isolated(given: Any, limit_s: float) -> Any:
-    """Return an FMU in its own process, or any other block unchanged."""
+    """Return an FMU that runs in a separate process, or any other block unchanged."""
     text = os.fspath(given) if isinstance(given, (str, os.PathLike)) else ""
     if not text.partition("?")[0].lower().endswith(".fmu"):
         return given

@@ -63,7 +63,7 @@ class Sweep:
 
     @property
     def travel_m(self) -> Array:
-        """Heights of the wheel centres above those at x = 0, positive in bump, shape (n, 4)."""
+        """Heights of the wheel centres relative to x = 0, positive in bump, shape (n, 4)."""
         return self.centre_m[..., 2] - self.centre_m[self.zero, :, 2]
 
     @property

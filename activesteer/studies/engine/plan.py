@@ -90,7 +90,7 @@ class Plan:
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 
     def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
-        """Return a run with its own values."""
+        """Return a run with other values of the keys."""
         overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
         return Request(run, sample, *place, factors, overrides)
 
@@ -104,7 +104,7 @@ def _has_text(values: Iterable[Any]) -> bool:
 
 
 def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> Iterator[tuple[Any, ...]]:
-    """Yield a combination, and those that differ from it in one value."""
+    """Yield a combination, and all combinations that differ from it in one value."""
     yield row
     for place, allowed in enumerate(values):
         yield from ((*row[:place], value, *row[place + 1 :]) for value in allowed)

@@ -56,7 +56,7 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Return a column of numbers, texts or truth values, or of anything else as JSON."""
+    """Return a column of numbers, texts or truth values. Other values become JSON."""
     try:
         numbers = any(isinstance(value, float) for value in values)
         plain = [float(value) if numbers and value is not None else value for value in values]

@@ -1,4 +1,4 @@
-"""Workers with their tasks behind one interface: this process, processes of this machine, or a Dask cluster.
+"""Workers that do tasks, with one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
 and repeated. A task that kills its worker every time is given up.

@@ -135,7 +135,7 @@ def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
 
 
 def write_identified(vehicle_file: Path, result: Identification, command: str, date: str) -> None:
-    """Write [single_track] and [two_track] into a vehicle file, and keep everything else in it.
+    """Write [single_track] and [two_track] into a vehicle file, and leave the rest unchanged.
 
     Args:
         vehicle_file: The file, as from `resources.find_vehicle`.

@@ -72,7 +72,7 @@ def _without_comment(line: str) -> str:
 
 
 def _value(text: str) -> float | str:
-    """Return a number if the text is one, else the text without its quotes."""
+    """Return the number in a text, or the text without its quotes."""
     found = number(text)
     if found is not None:
         return found

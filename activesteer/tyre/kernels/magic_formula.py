@@ -118,7 +118,7 @@ def rolling_resistance_moment(p, fz: float, fx: float, gamma: float, pressure: f
 
 @compiled
 def _equivalent_slip(alpha: float, stiffness_ratio_kappa: float) -> float:
-    """Slip angle that stands for combined slip, with the sign of alpha (4.E77, 4.E78)."""
+    """Equivalent slip angle for combined slip, with the sign of alpha (4.E77, 4.E78)."""
     tangent = math.tan(alpha)
     size = math.atan(math.sqrt(tangent * tangent + stiffness_ratio_kappa * stiffness_ratio_kappa))
     return math.copysign(size, alpha)

@@ -127,7 +127,7 @@ def _follow_mean(setup, state, wheel, slow):
 
 @inlined
 def _hand_over(setup, state, wheel):
-    """Raise a limit that is below the highest pressure because the car has become faster again after a hand-over."""
+    """Raise the limit of a wheel by one step towards the highest pressure, when the car is faster again."""
     highest = setup.full_pedal_pressure_Pa
     state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
 

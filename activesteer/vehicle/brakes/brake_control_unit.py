@@ -1,4 +1,4 @@
-"""One step of the brakes: demand, control unit at its own rate with speed estimate and traction control, pressures.
+"""One step of the brakes: demand, control unit, speed estimate, traction control and pressures.
 
 While no brake acts, the wheels that are not driven give the speed. While a brake acts, the fastest wheel is closest to
 the car's speed, and the acceleration is integrated from the last unbraked instant on. The measured acceleration is the

@@ -331,7 +331,7 @@ def _force(model: mujoco.MjModel, tendon: int) -> Values:
 
 
 def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
-    """Return angles of steering wheel, superposition and wheels, torque of the hands, travel of the rack."""
+    """Return the angles of steering wheel, superposition and wheels, the hand torque, and the rack travel."""
     ratio, felt = steering.ratio, 1.0 - steering.assist_fraction
     wheel, added, rack, rl, rr = (
         column
