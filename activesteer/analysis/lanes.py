@@ -152,7 +152,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return distance along a path, which may cross itself, and distance to its left [m] of a car that follows it."""
+    """Return distance along a path and to its left [m] of a car that follows the path, which may cross itself."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):

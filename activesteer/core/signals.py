@@ -119,7 +119,7 @@ def record_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
 
 @functools.cache
 def nested_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """Return the same fields, with a record of four numbers for the wheels, which numpy turns into a tuple."""
+    """Return the fields of `record_fields`, with a record of four numbers for the wheels."""
     widths = zip(get_type_hints(message), widths_of(message), strict=True)
     wheels = [(corner, "f8") for corner in CORNERS]
     return [(name, "f8" if width == 1 else wheels) for name, width in widths if width]

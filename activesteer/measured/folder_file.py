@@ -161,7 +161,7 @@ class MeasuredFile:
         return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
     def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a case with overrides, a varying number changed by its difference from the files."""
+        """Return a case with overrides. A number that varies changes by its difference from the files."""
         for change in changes:
             numbers = {key: self.nominal[key] for key in change if key in self.nominal}
             added = {key: case.get(key, own) + (change[key] - own) for key, own in numbers.items()}

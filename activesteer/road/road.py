@@ -315,7 +315,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles along the path, whatever the rectangle (see the base class)."""
+        """Return quadrangles along the path. The rectangle has no effect (see the base class)."""
         path, found = self.path, []
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)

@@ -177,7 +177,7 @@ def _step_steers(count: int) -> None:
 
 
 def _with_file(scenario: Scenario, path: Path) -> float:
-    """Return the time per step of a run as on the command line [us], without building, settling and opening."""
+    """Return the time per step of a recorded run [us], without building, settling and opening the file."""
     simulation = Simulation(scenario, _CONTROLLER)
     start = 0.0
     with simulation.recorded_to(path):

@@ -160,7 +160,7 @@ def _environment() -> Environment:
 
 
 def filled(template: str, **values: Any) -> str:
-    """Return the text of a template."""
+    """Return the text of a template with these values."""
     return _environment().get_template(template).render(values)
 
 
@@ -273,7 +273,7 @@ _LEAST = 1e-4
 
 
 def car_table(car: CarSpec, result: KcResult) -> str:
-    """Return the text of the table."""
+    """Return the text of the table of a measured car."""
     model, config = result.measured.vehicle.model, car.config
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

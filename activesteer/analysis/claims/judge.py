@@ -235,7 +235,7 @@ def _step_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics, whole: bool) -> RunMetrics:
-    """Return the added angles, and the times when the signals reach the common level, from half the steering angle.
+    """Return the added angles, and the times from the step to the common level of each signal.
 
     A time is nan if its run is incomplete or stays below the level.
     """

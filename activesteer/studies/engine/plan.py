@@ -62,7 +62,7 @@ class Plan:
         return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
-        """Return indices of manoeuvre and vehicle with overrides, for every combination of texts that may be driven."""
+        """Return indices of manoeuvre and vehicle with overrides, for each combination of texts that can occur."""
         study = self.study
         places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
         for samples in self.samples:
