@@ -47,7 +47,7 @@ class FrequencyResponse(NamedTuple):
 
 
 def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Array) -> FrequencyResponse:
-    """Return the response of a channel to the steering, at the lines of the spectrum nearest to frequencies [Hz]."""
+    """Return the response of a channel to the steering, at the spectral lines nearest to frequencies [Hz]."""
     count, step_s = len(recording.time_s), timestep(recording.time_s)
     u, y = np.fft.rfft(recording[INPUT]), np.fft.rfft(recording[output])
     lines_Hz = np.fft.rfftfreq(count, step_s)

@@ -142,7 +142,7 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
 
 
 def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -> float:
-    """Return the heading of the car at the end of a run against the nearest piece of a path, -pi to pi [rad]."""
+    """Return the final heading of the car relative to the nearest piece of a path, -pi to pi [rad]."""
     # A car that turned around several times has its whole turns left out.
     x, y = (channel[-1] for channel in front_axle(recording))
     nearest = int(np.argmin(np.hypot(path_x_m - x, path_y_m - y)))
@@ -152,7 +152,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return distance along a path and to its left [m] of a car that follows the path, which may cross itself."""
+    """Return the distance of a car along a path, which may cross itself, and to the left of the path [m]."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
@@ -167,7 +167,7 @@ def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
-    """Return world y of the front axle centre at its first passage of each x, interpolated [m], shape (n,)."""
+    """Return world y of the front axle centre when it first passes each x, interpolated [m], shape (n,)."""
     # The values of x ascend; y is nan where the run never gets there.
     x, y = front_axle(recording)
     # A car that spins may go back: only samples ahead of all earlier ones count.
@@ -215,7 +215,7 @@ TIME_TOLERANCE_S: Final = 0.02
 
 
 def corridor(time_s: Array, values: Array, width: float | Array) -> tuple[Array, Array]:
-    """Return the lower and the upper edge around a signal: `TIME_TOLERANCE_S` in time, and a tolerance in the value."""
+    """Return the lower and the upper edge of a corridor around a signal, with tolerances in time and value."""
     fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
     moved = np.stack([np.interp(time_s + shift, time_s, values) for shift in fine])
     return moved.min(axis=0) - width, moved.max(axis=0) + width

@@ -189,7 +189,7 @@ class Requirement(Expression):
         return lambda runs: _all([margin(runs) for margin in margins])
 
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
-        """Return the margin to the limit, which is the side without a metric, or else the right one."""
+        """Return the margin to the limit. The limit is the side without a metric, or else the right side."""
         one, other = self._number(left), self._number(right)
         self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)

@@ -46,7 +46,7 @@ def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
 
 
 def counted(recording: RecordingLike, channel: str, part: slice = _ALL) -> Array:
-    """Return the samples of a channel that count in metrics: all, or the `counted_sideslip` of a sideslip angle."""
+    """Return the samples of a channel that count in metrics: all, or for a sideslip angle `counted_sideslip`."""
     return counted_sideslip(recording, part) if channel == "sideslip_rad" else recording[channel][part]
 
 
@@ -171,7 +171,7 @@ _ENDS_PERIODS: Final = 6.0
 
 
 def low_pass(values: Array, timestep_s: float, cut_off_Hz: float, poles: int = 12) -> NDArray[np.float64]:
-    """Apply a Butterworth filter without phase: half of its even number of poles forwards, the same backwards.
+    """Apply a Butterworth filter without phase, with half of its poles forwards and half backwards.
 
     Both passes have the given cut-off frequency; together they halve a sine of this frequency.
 

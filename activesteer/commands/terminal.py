@@ -40,7 +40,7 @@ def cells(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[list[s
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
-    """Print a value as JSON, on one line for a program that reads it while this program runs."""
+    """Print a value as indented JSON, or on one line for a program that reads the output meanwhile."""
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
@@ -91,7 +91,7 @@ def stdout_for_json() -> Iterator[None]:
 
 
 def painted(text: str, colour: int) -> str:
-    """Return the text in a colour on a terminal, or with FORCE_COLOR (force-color.org), and never with NO_COLOR."""
+    """Return the text in a colour on a terminal or with FORCE_COLOR, and never with NO_COLOR."""
     forced = os.environ.get("FORCE_COLOR", "") not in ("", "0")
     coloured = forced or (sys.stdout.isatty() and os.environ.get("TERM") != "dumb")
     plain = bool(os.environ.get("NO_COLOR")) or not text.strip()
@@ -140,7 +140,7 @@ _LINE_EVERY_S: Final = 10.0
 
 
 class Progress:
-    """Bar on a terminal that shows which fraction of the work is done, or lines in a log for counted runs."""
+    """Progress bar on a terminal, or lines in a log for counted runs."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
         self._label, self._quiet = label, quiet

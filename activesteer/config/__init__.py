@@ -97,7 +97,7 @@ class Source:
 
 
 def _numbered(name: str, elements: Mapping[str, int]) -> str:
-    """Return a dotted key with the number of the current element behind the name of every list."""
+    """Return a dotted key, with the number of the current element after the name of each list."""
     key = ""
     for part in name.strip().split("."):
         key = f"{key}.{part}" if key else part
@@ -228,7 +228,7 @@ def element_of(hint: Any) -> type | None:
 
 @functools.cache
 def key_paths(cls: type, prefix: str = "") -> tuple[str, ...]:
-    """Return all dotted keys that a table for `cls` may have, cached: every override is looked up in them."""
+    """Return all dotted keys that a table for `cls` may have, cached because each override needs them."""
     paths: list[str] = []
     hints = hints_of(cls)
     for field in dataclasses.fields(cls):

@@ -237,7 +237,7 @@ def fault_words(fault: Mapping[str, Any]) -> str:
 
 
 def fault_from(given: Any, now_s: float) -> Fault:
-    """Return a fault given during a run as an object or as text, by default from the current time on."""
+    """Return a fault given during a run as an object or as text. By default it starts now."""
     if isinstance(given, str):
         table = fault_table(given, None if "@" in given else now_s)
         given = build(Fault, table, Source("", error=ManeuverError))

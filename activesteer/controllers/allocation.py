@@ -153,7 +153,7 @@ def allocated(
 def moment_change(
     block: Allocation, now: Estimate, driver_rad: float, at_rad: tuple[float, float], angle_rad: tuple[float, float]
 ) -> float:
-    """Return the change of the axle curves' yaw moment on the way from measured to allocated angles [Nm]."""
+    """Return the change of the yaw moment from the measured to the allocated angles, by the axle curves [Nm]."""
     _, _, front_now, rear_now = axle_forces(block._curves, now, driver_rad + at_rad[0], at_rad[1])
     _, _, front_then, rear_then = axle_forces(block._curves, now, driver_rad + angle_rad[0], angle_rad[1])
     return block._axle_kgm * ((front_then - front_now) - (rear_then - rear_now))
@@ -168,7 +168,7 @@ def _relieved(
     angle_rad: tuple[float, float],
     ay_mps2: float,
 ) -> float:
-    """Return the superposition angle that relieves front wheels whose force turns the car more than required [rad]."""
+    """Return the superposition angle that relieves front wheels which turn the car more than required [rad]."""
     front_slip_rad, rear_slip_rad, front, rear = axle_forces(
         block._curves, now, driver_rad + angle_rad[0], angle_rad[1]
     )

@@ -1,4 +1,4 @@
-"""From the yaw rate error to a steer angle: desired yaw rate, tolerance function, PID, and direction of the angle."""
+"""Steer angle from the yaw rate error: desired yaw rate, tolerance function, PID, and direction of the angle."""
 
 from __future__ import annotations
 

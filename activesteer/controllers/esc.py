@@ -64,7 +64,7 @@ def beyond(value: float, band: float) -> float:
 
 
 def stabilising(p: EscParameters, error_radps: float, sideslip_rad: float) -> float:
-    """Return M_z / J_z for a yaw rate error, desired less actual, and a sideslip angle [rad/s2]."""
+    """Return M_z / J_z for a yaw rate error (desired minus actual) and a sideslip angle [rad/s2]."""
     error = beyond(error_radps, p.yaw_rate_band_radps)
     slide = beyond(sideslip_rad, p.sideslip_limit_rad)
     return error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2

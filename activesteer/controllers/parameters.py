@@ -28,7 +28,7 @@ _Length = Annotated[float, Range(0.01, 5.0)]
 
 @functools.cache
 def file_gains(name: str, gains: type[T]) -> T:
-    """Return the gains of a controller from the table of its name in its file in `models/controllers`."""
+    """Return the gains of a controller from its file in `models/controllers`."""
     table, source = read_toml(find_controller_variant(name), ControllerError)
     return build(gains, table.get(name, {}), source, (name,))
 

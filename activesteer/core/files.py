@@ -74,7 +74,7 @@ def delete_temporary_files() -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a text file in UTF-8 that replaces an existing file as a whole, and return its path."""
+    """Write a text file in UTF-8, in place of an existing file, and return its path."""
     with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)

@@ -60,7 +60,7 @@ def text_table(
 
 
 def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
-    """Return a line in parts that fit, further parts indented by four more columns than the line."""
+    """Split a line into parts that fit. Further parts are indented by four more columns."""
     if _length(line) <= width:
         return [line]
     indent = " " * (len(line) - len(line.lstrip()) + 4)

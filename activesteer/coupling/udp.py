@@ -1,4 +1,4 @@
-"""Commands from another process by UDP, and the state of the car back to it (see docs/coupling.md for the messages)."""
+"""UDP link: commands from another process, and the state of the car back to it (see docs/coupling.md)."""
 
 from __future__ import annotations
 

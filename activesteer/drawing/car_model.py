@@ -24,7 +24,7 @@ def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
-    """Return the visible geoms of all bodies but the world as simple solids, in the frames of their bodies.
+    """Return the visible geoms of all bodies except the world as simple solids, in the frames of their bodies.
 
     A capsule becomes a cylinder of the same length; meshes and planes are left out.
     """

@@ -36,7 +36,7 @@ class Channels(Protocol):
 
 
 def drawn_values(recording: Channels, channel: str) -> Array:
-    """Return a channel as a line shows it: the sideslip angle of a car that turns round continues beyond 180 deg."""
+    """Return a channel as drawn. The sideslip angle of a car that turns round continues beyond 180 deg."""
     if channel in AXLE_SLIP:
         slips, loads = (
             [recording[f"{wheel}_{what}"] for wheel in AXLE_SLIP[channel]] for what in ("slip_angle_rad", "tyre_fz_N")

@@ -1,4 +1,4 @@
-"""Angles of the wheels as enlarged wedges, on which 2 deg of rear steering can be seen.
+"""Enlarged angles of the wheels as wedges, which make 2 deg of rear steering visible.
 
 Points are in the axes of the car: x forward and y left, the origin on the road below the middle of its front axle.
 """

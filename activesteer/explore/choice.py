@@ -1,4 +1,4 @@
-"""Checked choices of the page: names of the package and of a folder, numbers for keys with a slider."""
+"""Checked choices of the page: names from the package or a folder, and numbers for keys with a slider."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class Slider(NamedTuple):
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
-    """Return the sliders of a run, for the groups in `own` (group -> the user's file) with all numbers of the file."""
+    """Return the sliders of a run. For groups in `own` (group -> the user's file), use all numbers of the file."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for group, file in (own or {}).items():
         found += _of_file(group, scenario, file)
@@ -140,7 +140,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
-    """Return the slider of a gain, from zero to some multiples of its value, or None for a value that is no number."""
+    """Return the slider of a gain, from zero to some multiples of its value, or None if it is not a number."""
     if not _is_number(declared.default):
         return None
     tables, _, name = key.rpartition(".")

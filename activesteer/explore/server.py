@@ -190,7 +190,7 @@ class ExploreServer:
         return taken
 
     async def _feed(self) -> None:
-        """Pass messages to the worker, outside the event loop: the worker may be busy and its pipe full."""
+        """Pass messages to the worker outside the event loop, because its pipe may be full."""
         loop = asyncio.get_running_loop()
         while True:
             await self._came.wait()

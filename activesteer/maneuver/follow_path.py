@@ -99,7 +99,7 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
 
 
 def _read_points(file: FilePath) -> dict[str, Any]:
-    """Read the points from a CSV with the header x_m,y_m, and speed and width there if it has such columns."""
+    """Read the points from a CSV with the columns x_m and y_m, and optional columns for speed and width."""
     columns, lines = read_columns(file, COLUMNS, OPTIONAL)
     check_points(columns["x_m"], columns["y_m"], lambda index: f"{file.name}, line {lines[index]}")
     return columns

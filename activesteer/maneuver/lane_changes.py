@@ -132,7 +132,7 @@ def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Return the points where cones touch the edges of lanes: at both ends, and at most 5 m apart in between.
+    """Return the points where cones touch the edges of lanes, at both ends and at most 5 m apart.
 
     By the standards the edges of a lane are tangents to the feet of its cones.
     """

@@ -222,7 +222,7 @@ class RandomSteer(Maneuver, kind="random_steer"):
     """The angle."""
 
     def __post_init__(self) -> None:
-        """Check that the band is wide enough for a run of this length: a sum of few sines is not random."""
+        """Check that the band is wide enough for the run, because a sum of few sines is not random."""
         random = self.random
         least_Hz = random.lowest_Hz + _LINES / self.duration_s
         if not least_Hz <= random.highest_Hz <= _MOST_Hz:

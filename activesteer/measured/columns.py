@@ -50,7 +50,7 @@ def check_rows(count: int, path: Path) -> None:
 
 @contextmanager
 def understood(path: Path, what: str) -> Iterator[None]:
-    """Context that turns any exception of a file reader, as libraries raise, into a RecordingError of one line."""
+    """Context that turns any exception of a file reader into a RecordingError of one line."""
     try:
         yield
     except RecordingError:
@@ -128,7 +128,7 @@ def _text(data: bytes) -> str:
 
 
 def _clock_s(texts: list[str | None]) -> Array | None:
-    """Return times of day [s], increasing over midnight, or None if a text is no time of day."""
+    """Return times of day [s], increasing over midnight, or None if a text is not a time of day."""
     found = [_CLOCK.fullmatch((text or "").strip()) for text in texts]
     if not all(found):
         return None
@@ -202,7 +202,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Append a number to the second and further columns of a name, which files such as MDF may repeat."""
+    """Number columns that share a name, as files such as MDF may contain, from the second one on."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:

@@ -349,7 +349,7 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], times: dict[str, Array]
 ) -> dict[str, Array] | str:
-    """Drive once, and return channels at their times in a recording, or the reason of a failure."""
+    """Drive once, and return channels at the times of a recording, or the reason for a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)

@@ -48,7 +48,7 @@ class Part(NamedTuple):
         return {"run": self.run, "part": self.part, "stage": self.stage, **self.compared.to_json()}
 
     def box(self) -> dict[str, Any]:
-        """Return mean width of the band, SI, and proportion of the measured samples in it, widened by the noise."""
+        """Return the mean width of the band, SI, and the share of measured samples in it, widened by the noise."""
         assert self.band is not None
         one, (low, high) = self.compared, self.band
         inside = (one.measured >= low - one.noise) & (one.measured <= high + one.noise)

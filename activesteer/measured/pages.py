@@ -289,7 +289,7 @@ def fit_page(found: Fit, name: str) -> Page:
 
 
 def _sentence(note: str) -> str:
-    """Return a note with a capital letter, unless it starts with a key, and a full stop."""
+    """Return a note with a capital letter and a full stop, except for a note that starts with a key."""
     return f"{note if '.' in note.partition(' ')[0] else note[0].upper() + note[1:]}."
 
 

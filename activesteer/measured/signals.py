@@ -211,7 +211,7 @@ Samples = tuple[Array, Array]
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in the order of their times, the last of several at one time."""
+    """Return the finite samples in the order of time. Of several samples at one time, keep the last."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file

@@ -227,7 +227,7 @@ def _sources_key(source: Path) -> str:
 
 
 def processor() -> str:
-    """Return the processor as the compiler, NumPy and the BLAS see it, which decides the last digits of results."""
+    """Return a description of the processor, which decides the last digits of results."""
     compiler = [getattr(config, "CPU_NAME", None) or get_host_cpu_name(), getattr(config, "CPU_FEATURES", None)]
     libraries = [os.environ.get(name, "") for name in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")]
     return repr(compiler + libraries)
@@ -249,7 +249,7 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a file imports from, and the table next to it with its name."""
+    """Return the files of the package that a file imports, and the table with its name next to it."""
     if file.suffix != ".py":
         return ()
     table = file.with_suffix(".txt")

@@ -90,7 +90,7 @@ def _colour(colour: str) -> str:
 
 
 def _extremes(y: Array) -> NDArray[np.intp]:
-    """Return the places of the least and the greatest value in equal stretches of a long curve, so no peak is lost."""
+    """Return the places of the extreme values in equal parts of a long curve, so that no peak is lost."""
     edges = np.linspace(0, len(y), _MOST_POINTS // 2 + 1).astype(int)
     low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
     places = [
@@ -101,7 +101,7 @@ def _extremes(y: Array) -> NDArray[np.intp]:
 
 
 def _numbers(values: ArrayLike, along: ArrayLike | None = None) -> list[float | None]:
-    """Return numbers of five digits, every n-th of too many, or None for a number that is not finite."""
+    """Return numbers with five digits, thinned if there are too many, or None for values that are not finite."""
     each = np.asarray(values, np.float64)
     if along is not None:
         each = np.broadcast_to(each, np.shape(along))

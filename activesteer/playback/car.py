@@ -218,7 +218,7 @@ def body_path(run: ReplayedRun, body: str) -> str:
 
 
 def send_ghost(stream: rr.RecordingStream, run: ReplayedRun, beside: ReplayedRun) -> None:
-    """Send the body of a car for the view of another run: transparent, and fainter the nearer the two cars are."""
+    """Send the body of a car for the view of another run. It is more transparent near the other car."""
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
     alpha = np.rint(255.0 * _GHOST_OPACITY * share_seen(_apart(run, beside, time_s))).astype(np.uint32)

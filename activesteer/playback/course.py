@@ -167,7 +167,7 @@ def _outline(run: ReplayedRun) -> Array:
 
 
 def _track(run: ReplayedRun) -> Array:
-    """Return the track of the centre of gravity, or of the chassis origin if the former was not recorded."""
+    """Return the track of the centre of gravity, or of the chassis origin if only this was recorded."""
     poses = run.recording.poses
     at = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
     if not run.has("x_m", "y_m"):

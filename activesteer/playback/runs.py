@@ -25,7 +25,7 @@ def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
 
 
 def send(stream: rr.RecordingStream, path: str, style: Any, time_s: Array, columns: Any, each: int) -> None:
-    """Send the static style of an entity, and its values over time, `each` of them at a time."""
+    """Send the static style of an entity, and its values over time in groups of `each`."""
     stream.log(path, style, static=True)
     stream.send_columns(path, times(time_s), columns.partition(lengths=[each] * len(time_s)))
 

@@ -227,7 +227,7 @@ class Plugin:
         return value / factor if factor != 1.0 else value
 
     def parameters_with(self, own: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        """Return the values of all parameters as far as a recording can hold them, with a user's defaults.
+        """Return the values of all parameters that a recording can hold, with a user's defaults.
 
         Args:
             own: Overrides: class -> name -> value.
@@ -238,7 +238,7 @@ class Plugin:
         return _plain({**defaults, **self.parameters, **own.get(self.key, {})})
 
     def make(self, setup: Any) -> Any:
-        """Create the block in its original state: nothing is carried over from one run to the next.
+        """Create the block in its original state, without memory of earlier runs.
 
         Args:
             setup: Properties of the car that the block may know.

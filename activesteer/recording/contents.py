@@ -433,7 +433,7 @@ def _link_of(table: dict[str, Any]) -> Link:
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
-    """Read a scene: the solids of each body in the order box, cylinder, sphere, and then the links."""
+    """Read a scene: the solids of each body in the order box, cylinder, sphere, then the links."""
     update = message_class(SCENE_SCHEMA).FromString(data)
     limits.check_count(len(update.entities), limits.MAX_PARTS, "entities", RecordingError, key="scene")
     primitives: list[ScenePart] = []

@@ -128,7 +128,7 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """Open a regular file, not a device or pipe that may never end, and return its descriptor."""
+    """Open a regular file and return its descriptor. A device or pipe, which may never end, is rejected."""
     with reading(path, RecordingError):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)

@@ -1,4 +1,4 @@
-"""A recording in memory with its exports, and the names of several.
+"""Recording in memory with its exports, and names for several recordings.
 
 CSV and Parquet are written with pyarrow and need no pandas.
 """
@@ -279,7 +279,7 @@ class Recording:
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def at(self, rows: NDArray[np.intp]) -> Recording:
-        """Return the same run with some of its rows (ascending numbers), in memory, and with all poses."""
+        """Return the run in memory with some of its rows (ascending numbers) and all poses."""
         values = self._values.at(rows) if isinstance(self._values, FileRows) else self._values[rows]
         return Recording(
             self._channels, self._time_s[rows], values, poses=self.poses, metadata=self.metadata,

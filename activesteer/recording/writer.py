@@ -1,4 +1,4 @@
-"""Writer of a recording: a target that is locked, and blocks that are streamed into an MCAP file during the run."""
+"""Writer of a recording: a locked target, and blocks that are streamed into an MCAP file during the run."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check without changes that a recording can be written to a path, at most in place of another recording."""
+    """Check that a recording can be written to a path, without changes and only in place of a recording."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)

@@ -46,7 +46,7 @@ _ZERO, _KEEP_LAST = 1, 2
 
 
 class CrgRoad(NamedTuple):
-    """Heights from the start of the reference line on, and that line, from the origin along x, if it is curved."""
+    """Heights along the reference line, and this line, from the origin along x, if it is curved."""
 
     grid: Grid
     line: Path | None

@@ -58,7 +58,7 @@ class DrawnSurface(NamedTuple):
 
 
 def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
-    """Return the places along and across a road where its surface is drawn [m]: evenly, and around every edge."""
+    """Return the places along and across a road at which its surface is drawn [m], evenly and at every edge."""
     count = min(_MAX_ALONG, max(2, round(length_m / _STEP_M)))
     # A skew edge passes a corner of each quadrangle where the steps have the ratio of its slope.
     skew = [abs(math.tan(obstacle.angle_rad)) for obstacle in road.obstacle if obstacle.angle_rad != 0.0]
@@ -78,7 +78,7 @@ def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
 
 
 def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
-    """Return the surface of a recorded run, or None if the road was plane, or the surface was not recorded."""
+    """Return the surface of a recorded run, or None if the road was plane or was not recorded."""
     if "surface" not in metadata:
         return None
     table = table_of(metadata["surface"], "surface")

@@ -101,7 +101,7 @@ class Area(NamedTuple):
     slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """Return the part of this rectangle within another one [m], or None if they do not overlap."""
+        """Return the part of this rectangle within another one [m], or None without an overlap."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         if not (start < end and right < left):
@@ -214,7 +214,7 @@ class Road:
         return not all(obstacle.is_smooth for obstacle in self.obstacle)
 
     def laid(self, course: Course | None) -> Road:
-        """Return the road as the car drives on it: with the path of the course if it follows that path.
+        """Return the road, with the path of the course if the road follows it.
 
         Raises:
             ManeuverError: the road follows the path, and the manoeuvre has none.
@@ -245,11 +245,11 @@ class Road:
         return s_m, d_m
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the distances along and to the left of the middle of the road of places of the world [m]."""
+        """Return the distances along and to the left of the middle of the road for places in the world [m]."""
         return x_m, y_m
 
     def extended_share(self, x_m: Array, y_m: Array) -> float:
-        """Return the fraction of places of the world [m] beyond the known surface, where its edge is extended."""
+        """Return the fraction of places in the world [m] outside the known surface, where its edge is extended."""
         grid = self.grid()
         if grid is None:
             return 0.0
@@ -297,7 +297,7 @@ class LaidRoad(Road):
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y of places along and next to the path, straight beyond its end (see the base class)."""
+        """Return world x and y for distances along and to the left of the path (see the base class)."""
         path = self.path
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
         beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
@@ -305,7 +305,7 @@ class LaidRoad(Road):
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the places along and next to the nearest point of the path (see the base class)."""
+        """Return distances along and to the left of the path for places in the world (see the base class)."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path

@@ -1,4 +1,4 @@
-"""Overrides: keys of files, of controllers and of users' blocks replaced for one run, each at most once."""
+"""Overrides: keys of files, controllers and users' blocks that are replaced for one run."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
-    """Return the overrides that none of these controllers reads, each with the [controllers] keys that it replaces."""
+    """Return the overrides that no controller reads, each with the [controllers] keys that it replaces."""
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
         key: _BUILT_IN.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))

@@ -186,7 +186,7 @@ def _advance(car, bindings, step_address):
 
 @compiled_call(types.void, types.Array(from_dtype(CAR), 1, "C"), types.intp, types.intp, types.intp)
 def drive_cars(cars, first, last, step_address):
-    """Drive each of some cars for the number of steps in `left`, or until Python has to act."""
+    """Drive each of several cars for the number of steps in `left`, or until Python must act."""
     for index in range(first, last):
         car = cars[index]
         bindings = carray(native_step._bindings_pointer(car.bindings), (1,))[0]

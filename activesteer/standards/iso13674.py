@@ -53,7 +53,7 @@ Signals = Mapping[str, Array]
 
 
 def loop(x: Array, y: Array) -> dict[str, float]:
-    """Return gradient and dead bands of a loop at its passages through zero, means of all periods."""
+    """Return gradient and dead bands of a loop where it passes through zero, averaged over all periods."""
     # The ordinate's dead band is the height of the loop at abscissa zero, positive if the ordinate lags behind the
     # abscissa; the abscissa's is the width at ordinate zero, with the same sign.
     up, down = (_crossings(x, y, sign) for sign in (1.0, -1.0))

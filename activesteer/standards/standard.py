@@ -209,7 +209,7 @@ def axis_label(name: str) -> str:
 
 
 def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return channels of runs, a panel each, versus the time from an event that is given in words."""
+    """Return a panel for each channel of the runs, versus the time from an event described in words."""
     return [
         Panel(
             f"time from {begin} [s]",

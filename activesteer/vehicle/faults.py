@@ -134,7 +134,7 @@ class _Acting:
         """Restore the part as built."""
 
     def recover(self) -> None:
-        """Return the part to normal when the fault ends, such as a motor to its demand with lag and rate."""
+        """Return the part to normal when the fault ends, for example a motor to its demand with lag and rate."""
 
 
 class _DemandFault(_Acting):

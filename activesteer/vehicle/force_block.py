@@ -89,7 +89,7 @@ def _words(address: int, size_bytes: int) -> NDArray[np.uint64]:
 
 
 def _find(address: int, wanted: int, limit_bytes: int, what: str) -> int:
-    """Return the byte offset of the only word that equals `wanted`, found by a scan to the first match."""
+    """Return the byte offset of the first word that equals `wanted`."""
     words = _words(address, limit_bytes)
     block = 256
     for start in range(0, len(words), block):
@@ -292,7 +292,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return one record, shape (1,), with 0 for numbers that are not given, also beyond the end of a short row."""
+    """Return one record, shape (1,), with 0 for numbers that are missing or beyond the end of a short row."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:

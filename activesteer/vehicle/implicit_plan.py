@@ -308,7 +308,7 @@ def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _sensed_body(model: mujoco.MjModel) -> int:
-    """Return the body with the only sensed acceleration, or 0 if the sensors need more than this body."""
+    """Return the body whose acceleration is the only sensed one, or 0 without such a body."""
     late = np.flatnonzero(model.sensor_needstage == int(mujoco.mjtStage.mjSTAGE_ACC))
     if (model.sensor_type[late] != int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)).any():
         return 0

@@ -182,7 +182,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Complete drive, brakes, friction and servos beyond MJCF, with forces by the activation at the end of a step."""
+    """Set up the actuators of drive, brakes, friction and servos, which act with the activation at the step's end."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER

@@ -80,7 +80,7 @@ def _link_rate(link, state, act, ten_length, userdata, timestep_s):
 
 @inlined
 def _motor_load(links, screw, act, ten_length):
-    """Return the load torque at the motor, positive if driving forwards, and the sum of its parts' sizes [N m]."""
+    """Return the load torque at the motor, positive if it drives forwards, and the sum of its parts' sizes [N m]."""
     lead = screw.lead_mprad
     if screw.n_links == 0.0:
         stretch = ten_length[int(screw.column)] - screw.column_rest_m
@@ -110,7 +110,7 @@ def _motor_limits(screw, speed):
 
 @inlined
 def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, timestep_s):
-    """Return the rate of a motor's speed: both loops within current, voltage and power, load, dry friction."""
+    """Return the rate of a motor's speed, from both loops within their limits, load and dry friction."""
     said = int(screw.userdata)
     userdata[said] = userdata[said + 1] = 0.0
     if screw.seized != 0.0:

@@ -182,7 +182,7 @@ def resume_part(part, act, qpos):
 
 @inlined
 def change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
-    """Replace the fault of a part, by addresses, with kind, offset and the demand of a stuck brake in `acting`."""
+    """Replace the fault of a part, with kind, offset and the demand of a stuck brake in `acting`."""
     own, before = carray(_part_pointer(part), (1,))[0], f64_pointer(acting)
     if before[0] == FLOAT and kind != FLOAT:
         resume_part(own, f64_pointer(act), f64_pointer(qpos))

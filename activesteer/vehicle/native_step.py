@@ -142,7 +142,7 @@ def _engage(bindings, gear):
 
 @inlined
 def _with_grip(setup, state, wheel, torque_Nm):
-    """Return the demand at a motor's wheel as traction control leaves it: less for a wheel that spins or locks."""
+    """Return the demand at a motor's wheel, reduced by traction control if the wheel spins or locks."""
     if setup.tcs == 0.0 or torque_Nm == 0.0:
         return torque_Nm
     faster_mps = state.wheel_mps[wheel] - state.reference_mps

@@ -74,7 +74,7 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory that steps are recorded in, and owner of what its `TAPE` record, shape (1,), points to.
+    """Memory for recorded steps. It owns the memory of its `TAPE` record, shape (1,).
 
     `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
     recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.
@@ -376,7 +376,7 @@ class ActuatorRecords:
         return self._actuators[actuator : actuator + 1]
 
     def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
-        """Return the records of link and screw of an actuator, only of its motor if no link follows, or nothing."""
+        """Return the records of link and screw of an actuator, only its motor without a link, or nothing."""
         record = self.of(actuator)
         place = int(record["record"][0])
         if record["kind"] == fb.KIND_SCREW:

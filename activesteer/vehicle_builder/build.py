@@ -128,7 +128,7 @@ def new_vehicle(
 
 
 def _install(files: Path, target: Path) -> None:
-    """Copy files into a folder that appears only when it is complete, so that a full disk leaves nothing."""
+    """Copy files into a folder that appears only when it is complete, so that a full disk leaves no files."""
     part = target.with_name(f".{target.name}-{secrets.token_hex(4)}.part")
     with writing(target, ParameterError):
         try:

@@ -217,7 +217,7 @@ _DIGITS: Final = 7
 
 
 def hardware_tables(part: Any) -> dict[str, Any]:
-    """Return the tables of actuators, motors, battery and sensors that are not empty, of a car's table or file."""
+    """Return the non-empty tables of actuators, motors, battery and sensors of a car."""
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
         "superposition_actuator": to_table(part.superposition_actuator or SuperpositionActuator(), defaults=False),

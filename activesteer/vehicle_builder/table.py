@@ -181,7 +181,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class RearSteeringTable:
-    """The hinge between rear knuckle and carrier, which every car of the package has, steered or not."""
+    """The hinge between rear knuckle and carrier, which every car has, even without rear steering."""
 
     axis_lower: Point | None = None
     """A point of the steering axis on the left side, in the table's units."""

@@ -304,7 +304,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 
 def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
-    """Return the wheel rate of the table, given or from the ride frequency, or None if it gives the spring rate."""
+    """Return the wheel rate, given or from the ride frequency, or None if the table gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:
@@ -453,7 +453,7 @@ def _fit_steering(car: CarDesign, trimmed: Trimmed, write: Write, log: Log) -> N
 
 
 def _ratio(held: HeldCar) -> float:
-    """Return steering wheel angle over mean steer angle of the front wheels, slope within 20 deg, unloaded."""
+    """Return the steering ratio about straight ahead: steering wheel over mean steer angle, within 20 deg, unloaded."""
     steer = []
     for angle in _STEER_RAD:
         held.equilibrium(Case("contact", steering_wheel_rad=float(angle)))

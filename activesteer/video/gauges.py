@@ -74,7 +74,7 @@ class Gauges:
             self._readings.pop()
 
     def _largest_scale(self) -> float:
-        """Set and return the largest scale at which rows fit into panes, and texts into their share of the frame."""
+        """Set and return the largest scale at which rows fit into panes and texts cover no more than their share."""
         width, high = self._size[0] / len(self._panes), self._size[1] / 480.0
         scale = max(min(high, math.sqrt(width / 640.0 * high)), _LEGIBLE)
         most = LARGEST_SHARE * self._size[0] * self._size[1]

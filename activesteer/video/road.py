@@ -127,7 +127,7 @@ def add_course(spec: mujoco.MjSpec, course: Course) -> None:
 
 
 def add_edges(spec: mujoco.MjSpec, paths: Sequence[Array]) -> None:
-    """Add edges that all cars stay between, a mark every 10 m and a post every 50 m, unless a car turns too far."""
+    """Add edges next to the cars' paths, a mark every 10 m and a post every 50 m, unless a car turns too far."""
     x_m, y_m = np.concatenate([path[:, :2] for path in paths]).T
     half_m = max(_LEAST_HALF_WIDTH_M, float(np.abs(y_m).max()) + _BESIDE_CAR_M)
     if half_m > _MOST_HALF_WIDTH_M:

@@ -62,7 +62,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return positions [m] and orientations w x y z of the bodies, outside the recording its end poses."""
+        """Return positions [m] and orientations w x y z of the bodies. Outside the recording, the end poses count."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)

@@ -86,7 +86,7 @@ def read_setting(name: str) -> Setting:
 
 
 def setting_of(recording: RecordingLike) -> str:
-    """Return the name of a run's setting, or an empty text if it has other overrides or belongs to the user."""
+    """Return the name of a run's setting, or an empty text if it matches no setting of the package."""
     name, overrides = entry(recording, "maneuver", "name"), recording.metadata.get("overrides") or {}
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
         return ""
@@ -210,7 +210,7 @@ def _verdict(claim: Claim, known: Mapping[str, str]) -> Verdict:
 
 
 def number_lines(values: Mapping[str, float]) -> list[str]:
-    """Return the values of a claim, in degrees and km/h: a line for each metric, the systems next to each other."""
+    """Return the values of a claim in degrees and km/h: a line for each metric, with all systems."""
     by_metric: dict[str, list[tuple[str, float]]] = {}
     for name, value in values.items():
         system, _, metric = name.partition("_")

@@ -232,7 +232,7 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
 
 
 def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> None:
-    """Keep the axis scale of the cars that do not spin, and draw all cars over the whole time in an inset."""
+    """Keep the axis scale of the cars that do not spin, and draw all cars in an inset."""
     # The inset stands in the corner that the curves leave free.
     kept = [curve for curve in drawn if not curve.lost]
     if len(kept) in (0, len(drawn)) or panel is PANELS["added"]:
@@ -324,7 +324,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE)) -> Figure:
-    """Draw panels over one time axis, as wide as a column, with phases or times of a standard's criterion."""
+    """Draw panels over one time axis in a column's width, with phases or the times of a standard's criterion."""
     drawn = drawn_runs(recordings)
     shown = present(panels, drawn)
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

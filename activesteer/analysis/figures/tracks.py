@@ -93,7 +93,7 @@ def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
 
 
 def _shade_body(axis: Axes, curve: DrawnRun) -> None:
-    """Shade the road that the front of the body covers, because a car on a stretched map would be a sliver."""
+    """Shade the road that the front of the body covers, because the stretched map distorts a drawn car."""
     try:
         left, right, *_ = lanes.corners(curve.recording, read_footprint(curve.recording))
     except RecordingError:
@@ -158,7 +158,7 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
 
 
 def _stretch(view: CourseView, aspect: float) -> int:
-    """Return the factor that stretches lateral positions for an axis about `aspect` times as high as wide."""
+    """Return the factor that stretches lateral positions for an axis with a ratio `aspect` of height to width."""
     (left, right), (low, high) = view.x_m, view.y_m
     return max(1, round(aspect * (right - left) / (high - low)))
 

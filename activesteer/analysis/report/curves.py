@@ -36,7 +36,7 @@ DIGITS: Final = 4
 
 
 def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bool, Array]]:
-    """Yield the lines of a run, each with a flag that is set for dotted lines: all but the first of the panel."""
+    """Yield the lines of a run, each with a flag for dotted lines: all lines but the first of the panel."""
     if panel.extreme is not None:
         yield False, panel.extreme.reduce([recording[line.channel] for line in panel.lines])
         return
@@ -72,7 +72,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:
-    """Return the times of all plots: thinned samples of the first run, to the end of the longest run [s]."""
+    """Return the times of all plots [s]: thinned times of the first run, up to the end of the longest run."""
     first = times_s[0]
     start = min(float(time_s[0]) for time_s in times_s)
     end = max(float(time_s[-1]) for time_s in times_s)

@@ -90,7 +90,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """Return the runs by manoeuvre, the paper's manoeuvres first in its order, and the paper's setting apart."""
+    """Return the runs by manoeuvre, in the paper's order, with runs in the paper's setting separate."""
     if not 1 <= len(recordings) <= MAX_RUNS:
         raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}

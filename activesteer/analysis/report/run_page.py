@@ -283,7 +283,7 @@ class Row(NamedTuple):
 
 
 def parameters(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """Return the entries of tables of the metadata: of the first run in its order, then of later runs."""
+    """Return the entries of tables of the metadata of all runs, in the order of the first run."""
     flat = []
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
@@ -331,12 +331,12 @@ def results(group: Group) -> list[dict[str, Any]]:
 
 
 def _is_judged(run: ReportedRun) -> bool:
-    """Return whether a change from or to this run can be good or bad: it is complete, and the car is controlled."""
+    """Return whether a change from or to a run can be rated: the run is complete, and the car under control."""
     return not run.problem and is_controlled(run.recording.metrics)
 
 
 def key_figures(group: Group) -> dict[str, str]:
-    """Return the column titles of the key figures, with units, and the metrics among them that any run has."""
+    """Return the column titles of the key figures, with units, and the metrics that at least one run has."""
     names = {name for run in group.runs for name in run.recording.metrics}
     found = {}
     for title, metrics in KEY_FIGURES.items():

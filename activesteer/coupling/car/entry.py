@@ -52,7 +52,7 @@ _limit_pointer: Final = pointer_to(from_dtype(record_of(Actuator)))
 
 @compiled_callback(types.void, *(types.intp,) * 10)
 def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, numbers, motion):
-    """Compute the channels of the last row that are not copies."""
+    """Compute those channels of the last row that are not copied from it."""
     row = word_pointer(rows)
     out = f64_pointer(numbers)
     length, speed = f64_pointer(row[_LENGTH]), f64_pointer(row[_SPEED])

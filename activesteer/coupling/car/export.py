@@ -189,7 +189,7 @@ def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ..
 
 
 def _seeds(loop: ClosedLoop) -> bytes:
-    """Return for each seed and sensor the random number of its offset, and the key of its noise."""
+    """Return, for each seed and sensor, the random number of its offset and the key of its noise."""
     block = loop.vehicle.sensors
     if block is None:
         return bytes(8)

@@ -162,7 +162,7 @@ class _Known:
         ]
 
     def target(self, address: int) -> Relocation | None:
-        """Return what an address points to, or None for a number that is not a known address."""
+        """Return the place that an address points to, or None for a number that is not a known address."""
         if address in self._functions:
             name = self._functions[address]
             if name not in self.functions:

@@ -128,7 +128,7 @@ def rear_camber_figure(result: KcResult) -> Figure:
 
 
 def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> list[Curve]:
-    """Return both wheels of an axle, the right one dashed over the left one, or the left wheel as a thin grey line."""
+    """Return both wheels of an axle, the right one dashed, or only the left wheel as a thin grey line."""
     if not both:
         return [Curve(x, values[:, 0], label, _GREY, "-", 0.9)]
     note = f", {label}" if label else ""

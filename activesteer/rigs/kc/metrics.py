@@ -186,7 +186,7 @@ def _left_right_difference(axle: Axle) -> float:
 
 
 def _support(axle: Axle, point: str) -> float:
-    """l/h times the slope of the path of a point in side view, forwards per upwards, without springs [%]."""
+    """Slope of the path of a point in side view, times l/h, forwards per upwards, without springs [%]."""
     sweep = axle.sweep("parallel_kinematic")
     slopes = axle.slope("parallel_kinematic", getattr(sweep, point)[..., 0], over=sweep.centre_m[..., 2])
     return 100.0 * wheelbase_mm(axle) / _cg_height(axle) * float(slopes.mean())

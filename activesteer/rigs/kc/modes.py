@@ -48,7 +48,7 @@ def tyre_stiffness(tyre: TyreParameters, pressure_Pa: float | None, load_N: floa
 
 
 def parking_moment_Nm(load_N: float, tyre: TyreStiffness) -> float:
-    """Return the moment of a standing tyre against turning about the vertical on a dry road [N m].
+    """Return the moment that resists turning a standing tyre about the vertical on a dry road [N m].
 
     Source: V. E. Gough, Practical Tire Research, SAE Transactions 64 (1956): mu / 3 sqrt(load^3 / pressure).
     """

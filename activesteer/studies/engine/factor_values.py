@@ -1,4 +1,4 @@
-"""Values of a sample for a manoeuvre and a vehicle, and how plausible they are: their distance from the files."""
+"""Values of a sample for a manoeuvre and a vehicle, and their plausibility: the distance from the files."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> 
 
 
 def _labelled(study: StudyFile, key: str) -> Any:
-    """Return every item with its name in the results: without folders, so that it is the same on every machine."""
+    """Return each item with a name without folders, so that results are equal on every machine."""
     items = getattr(study, key)
     labels = [label_of(item) for item in items]
     for label in labels:
@@ -231,7 +231,7 @@ def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
 
 
 def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
-    """Return True if a value affects any run: gains need their controller, the preview of a path needs a path."""
+    """Return True if a value affects any run: a gain needs its controller, a preview needs a path."""
     part, first, *rest = [*leaf.split("."), "", ""]
     follows_path = scenario.maneuver.course is not None
     if part == "files":

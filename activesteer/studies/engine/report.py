@@ -229,7 +229,7 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
 
 
 def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> list[Any]:
-    """Return the 5, 50 and 95 % quantiles of each controller's difference from the first in the same sample.
+    """Return the 5, 50 and 95 % quantiles of the differences from the first controller in the same sample.
 
     `smaller` is the share of the samples in which its value is smaller in magnitude.
     """

@@ -100,7 +100,7 @@ def controller_digest(controller: str) -> str:
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
-    """Return the identity of a run: equal if and only if everything that decides the result is equal."""
+    """Return the identity of a run, equal for two runs exactly if all their inputs are equal."""
     parts = {
         "scenario": describe(scenario) | {"overrides": None},
         "files": scenario.files,
@@ -286,7 +286,7 @@ _seen: dict[str, str] = {}
 
 
 def _problem(key: str, settings: Settings) -> str:
-    """Check once per process that this worker has the files and versions of the start of the study."""
+    """Check once per process that files and versions are unchanged since the start of the study."""
     if key not in _seen:
         _seen[key] = differences(settings)
     return _seen[key]

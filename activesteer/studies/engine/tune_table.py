@@ -103,7 +103,7 @@ def read_table(study: StudyFile) -> TuneTable:
 
 
 def _in_one_line(value: Any) -> Any:
-    """Return a text of several lines, or a table of such texts, with blanks in place of the line breaks."""
+    """Return a text, or a table of texts, with blanks in place of the line breaks."""
     if isinstance(value, Mapping):
         return {key: _in_one_line(item) for key, item in value.items()}
     return " ".join(value.split()) if isinstance(value, str) else value

@@ -290,7 +290,7 @@ class _Search:
         return [self.plan.request_with(run, number, place, values) for run, place in enumerate(self._places)]
 
     def _seeds(self) -> list[dict[str, Any]]:
-        """Return the sets to try first: from the file, a whole grid, or nominal values to satisfy statements."""
+        """Return the sets to try first: those of the file, a whole grid, or the nominal values for statements."""
         factors, prior, seeds = self.plan.study.factors, self.judge.prior, self.table.seeds
         # Optuna's own samplers of grids end the search when they are through, which fails outside of its loop.
         if self.table.sampler == "grid":

@@ -183,7 +183,7 @@ class DaskCluster(Workers):
         self._count()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Start a task as `Workers` does, on one worker of each machine first, so that kernels are compiled once."""
+        """Start a task like `Workers`, first on one worker of each machine, so that kernels are compiled once."""
         hosts: dict[str, list[str]] = {}
         for address in self._client.nthreads():
             hosts.setdefault(address.rpartition(":")[0], []).append(address)
@@ -205,7 +205,7 @@ class DaskCluster(Workers):
 
 @contextlib.contextmanager
 def connected(scheduler: str) -> Iterator[Any]:
-    """Yield a client of the scheduler at an address, such as tcp://host:8786, or of the file that it wrote."""
+    """Yield a client of the scheduler, given by its address such as tcp://host:8786 or by its file."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra
     except ImportError as reason:
@@ -391,7 +391,7 @@ def in_parallel(
     scheduler: str | None = None,
     workers: Workers | None = None,
 ) -> list[Any]:
-    """Call a function of a module with each set of arguments, and return the results in the order of the arguments.
+    """Call a function of a module with each set of arguments, and return the results in the same order.
 
     `report` gets the index of the arguments and the number of finished calls. Given workers still belong to the caller;
     otherwise see `workers_for`.

@@ -239,7 +239,7 @@ class LinearCar:
 
 
 def _identifier(name: str, taken: Sequence[str]) -> str:
-    """Return the name of a mode as the name of a state, numbered if an earlier mode has the same name."""
+    """Return an identifier from the name of a mode, with a number if the identifier is taken."""
     base = re.sub(r"\W+", "_", name)
     used = {re.sub(r"_(re|im)$", "", other) for other in taken}
     return next(name for name in (base, *(f"{base}_{number}" for number in range(2, 99))) if name not in used)
@@ -482,7 +482,7 @@ def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
 
 
 def _branches(found: Sequence[Sequence[tuple[str, complex]]]) -> list[tuple[str, list[complex]]]:
-    """Return paths of poles from one speed to the next, each with its commonest name not taken by a longer path."""
+    """Return the paths of poles between speeds, each with its most common name that no longer path has."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to import
 
     paths: list[list[tuple[str, complex]]] = []
