@@ -196,7 +196,7 @@ def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
 
 
 def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], ...]]:
-    """Return the height of the ground and, of an uneven road, corners [m], factors of their colours, and triangles."""
+    """Return the ground for the page: its height, and the mesh of an uneven road with colour factors."""
     drawn = surface_in(recording.metadata)
     if drawn is None:
         return 0.0, ()

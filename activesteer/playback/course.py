@@ -49,7 +49,7 @@ class Extent(NamedTuple):
 
 
 def extent(runs: Sequence[ReplayedRun]) -> Extent:
-    """Return the rectangle that cars and course take up together."""
+    """Return the bounding rectangle of the cars and the course."""
     points = [_track(run) for run in runs]
     course = _course(runs)
     if course is not None:

@@ -375,7 +375,7 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Return the deflection of a coordinate of the (mirrored) left wheel from its curves, its rate, the curves' slopes.
+    """Return a coordinate's deflection from the curves (as a left wheel), its rate, and the curves' slopes.
 
     Then follow deflection and rate as the engine's tendons have them, with straight curves.
     """
