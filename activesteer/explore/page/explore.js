@@ -19,7 +19,7 @@ export function say(text, hint = false) {
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
-const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0 };
+const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
 window.activesteer = state; // for tests and the curious
 
 const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); $("start").disabled = true; });
