@@ -60,7 +60,7 @@ COURSES: Final = {
     ),
     "slalom": DrivingCourse(
         "Slalom",
-        f"Follow the dashed line between the cones, as fast as you can. Each cone adds {_CONE_S:g} s.",
+        f"Drive along the dashed line, as fast as you can. Each cone adds {_CONE_S:g} s.",
         "slalom",
         60.0,
     ),

@@ -280,7 +280,8 @@ class Road:
         for it in self.obstacle:
             if it.height_m is None or it.kind == "sine_wave":
                 continue
-            d_m = np.linspace(*np.clip(it.borders, right_m, left_m), _EDGE_POINTS)
+            right, left = np.clip(it.borders, right_m, left_m)
+            d_m = np.linspace(right, left, _EDGE_POINTS)
             near_m = it.start_m - math.tan(it.angle_rad) * d_m
             far_m = near_m + (math.inf if it.length_m is None else it.length_m)
             s_m = np.clip(np.concatenate([near_m, far_m[::-1]]), start_m, end_m)

@@ -398,7 +398,11 @@ def metric_rows(group: Group) -> list[list[Text]]:
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
-        cells: list[Text] = [metric.label, metric.unit_name, texts[0]]
+        cells: list[Text] = [
+            Markup('<span title="{}">{}</span>').format(name, metric.label),
+            metric.unit_name,
+            texts[0],
+        ]
         for value, text in zip(others, texts[1:], strict=True):
             compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
             percent = Markup('{} <span class="quiet">({})</span>').format(*compared)

@@ -102,7 +102,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length ? 38 : 32)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
@@ -218,7 +218,14 @@ class Chart {
     for (const [value] of panel.limits) level(py(value));
     ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
-    for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
+    for (const [x, y, text, colour] of panel.notes) {
+      ctx.fillStyle = colour || paint.ink;
+      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + 3 * dpr); continue; }
+      // A point in a row has its value beside it, where there is room.
+      const before = px(x) > bbox.left + 0.8 * bbox.width;
+      ctx.textAlign = before ? "right" : "left"; ctx.textBaseline = "middle";
+      ctx.fillText(text, px(x) + (before ? -7 : 7) * dpr, py(y));
+    }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
     panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 5 * dpr, bbox.width - 8 * dpr));
@@ -338,7 +345,7 @@ function drawPicture(box, picture, place) {
 // One button and one slider for all curves over time of a page, which stay in sight.
 function addPlayer(charts) {
   const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
-  if (!timed.length) return;
+  if (2 * timed.length < charts.length || !timed.length) return; // not what the page shows
   let start_s = Infinity, end_s = -Infinity;
   for (const time_s of timed.flatMap(({ panel }) => panel.curves.flatMap((curve) => curve.x))) if (time_s != null) { start_s = Math.min(start_s, time_s); end_s = Math.max(end_s, time_s); }
   if (!(end_s > start_s)) return;
@@ -366,7 +373,7 @@ function addContents() {
   if (sections.length < LEAST_SECTIONS) return;
   sections.forEach((section, i) => { section.id ||= `part-${i + 1}`; });
   const links = sections.map((section) => element("a", { href: `#${section.id}` }, section.querySelector("h2").textContent));
-  const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Contents"), ...links);
+  const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Top"), ...links);
   document.querySelector("#contents").after(bar);
   // On a wide screen the links take as many lines as they need; what stays in sight below them follows.
   new ResizeObserver(() => document.querySelector("main").style.setProperty("--jump", `${bar.offsetHeight}px`)).observe(bar);
