@@ -57,7 +57,7 @@ export class Curves {
   // Let another part of the grid be as high as some rows of curves.
   besides(part) {
     const row = HEIGHT + 36, columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length;
-    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.ceil((part.firstElementChild.offsetHeight - 40) / row))}` : "";
+    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.round(part.firstElementChild.offsetHeight / row))}` : "";
   }
 
   // New curves have their scales in the next frame.

@@ -1,5 +1,5 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, inWords, number, offer, option, small } from "./look.js";
+import { courses, element, explained, inWords, number, offer, option, small } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
@@ -59,7 +59,7 @@ export class Drive {
 
   offer(names) {
     $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => option(name)));
-    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name].split(/[:;]| \(/)[0]}` : name)));
+    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, explained(name, names.titles))));
     this.choose({});
   }
 
