@@ -202,8 +202,9 @@ export class Drive {
     const hands = this.pad() ?? (keys.steer || keys.throttle || keys.brake ? keys : { ...this.touch, direct: true });
     const text = JSON.stringify(hands);
     if (text === this.last) return;
+    this.number += 1;
+    if (this.last) this.sent.set(this.number, performance.now()); // the first ones are at rest
     this.last = text;
-    this.sent.set(++this.number, performance.now());
     this.act({ ...hands, number: this.number });
   }
 
@@ -254,7 +255,9 @@ export class Drive {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
-    $("gauges").children[Object.keys(rows).indexOf("cones")].hidden = !this.scene.cones.length;
+    const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
+    gauge("cones").hidden = !cones;
+    gauge("rear steer").hidden = cones && small.matches; // a phone has no room for both
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
