@@ -218,6 +218,11 @@ def typeset(text: str) -> str:
     return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
 
 
+def three_digits(value: float) -> str:
+    """Return a number with three digits, or as a whole number from 100 on, typeset."""
+    return typeset(f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}")
+
+
 def _row(
     channel: str, label: str, digits: int, min_span: float, short: str = "", unit: DisplayUnit | None = None
 ) -> Quantity:

@@ -20,7 +20,7 @@ from activesteer.config.faults import Fault, fault_table, fault_words
 from activesteer.controllers import system_of
 from activesteer.core.conventions import Array
 from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
-from activesteer.core.units import display_unit, typeset
+from activesteer.core.units import display_unit, three_digits
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -231,11 +231,11 @@ def _dots(faults: list[dict[str, Any]]) -> Picture:
     def panel(figure: str, label: str) -> Panel:
         curves = []
         notes = []
-        for side, below, marker in zip(SIDES, (0.0, 0.36), "oD", strict=True):  # in rows
+        for side, below, marker in zip(SIDES, (0.0, 0.3), "oD", strict=True):  # in rows
             own = [row for row in faults if row["direction"] == side and _named(row) in names]
             x, y = [_shown(row, figure) for row in own], [names.index(_named(row)) + below for row in own]
             curves.append(Curve(x, y, side, dashes="", marker=marker, size=6.0))
-            notes += [(at, row, typeset(f"{at:.3g}")) for at, row in zip(x, y, strict=True)]
+            notes += [(at, row, three_digits(at)) for at, row in zip(x, y, strict=True)]
         return Panel(label, "", curves, names=names, notes=notes)
 
     panels = [

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.core.metric_table import METRICS
-from activesteer.core.units import parameter_title, quantity_of, typeset
+from activesteer.core.units import parameter_title, quantity_of, three_digits, typeset
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
@@ -68,3 +68,8 @@ def test_parameters_are_called_by_the_words_of_their_keys(key, title):
 )
 def test_zero_has_no_minus_sign_on_a_page(text, shown):
     assert typeset(text) == shown
+
+
+def test_a_page_gives_three_digits_and_whole_numbers_from_a_hundred_on():
+    texts = [three_digits(value) for value in (19.0, -0.05541, 1.1, 330.7, 1530.2, 0.0)]
+    assert texts == ["19.0", "\N{MINUS SIGN}0.0554", "1.10", "331", "1530", "0.00"]

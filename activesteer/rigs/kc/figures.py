@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.core.conventions import Array
-from activesteer.core.units import typeset
+from activesteer.core.units import three_digits, typeset
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
@@ -110,7 +110,7 @@ def _metric_row(entry: KcMetric) -> list[Text]:
         Markup('<span title="{}">{}</span>').format(
             entry.definition, entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
         ),
-        _digits(value) if math.isfinite(value) else "none",
+        three_digits(value) if math.isfinite(value) else "none",
         entry.unit,
         f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
         {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
@@ -307,7 +307,7 @@ def _targets(result: KcResult) -> Picture:
     x_label = "place in the target band: 0 lowest, 1 highest"
     band = Area([0.0, 1.0], -0.9, len(rows) - 0.3, "", "#d5ead9")
     names = [_row_name(entry, told=False) for entry in rows]
-    notes = [(places[number], float(number), _digits(entry.value)) for number, entry in enumerate(rows)]
+    notes = [(places[number], float(number), three_digits(entry.value)) for number, entry in enumerate(rows)]
     panel = Panel(x_label, "", curves, areas=[band], names=names, notes=notes, x_range=(-0.7, 1.7))
     return Picture("target bands", [panel], width_in=8.5, height_in=1.2 + 0.24 * len(rows))
 
@@ -318,13 +318,8 @@ def _place(entry: KcMetric) -> float:
     return (entry.value - low) / (high - low) if high > low else 0.5
 
 
-def _digits(value: float) -> str:
-    """Return a value with the three digits that a rig can repeat."""
-    return typeset(f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}")
-
-
 def _row_name(entry: KcMetric, *, told: bool = True) -> str:
     assert entry.band is not None
     name = entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
     band = f"{entry.band[0]:g} to {entry.band[1]:g} {entry.unit}".removesuffix(" -")
-    return typeset(f"{entry.axle}  {name}{f'  {_digits(entry.value)}' if told else ''} ({band})")
+    return typeset(f"{entry.axle}  {name}{f'  {three_digits(entry.value)}' if told else ''} ({band})")
