@@ -48,6 +48,7 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("road.mu", "road: friction coefficient"),
         ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
         ("load.cg_height_change_m", "centre of gravity height change [m]"),
+        ("vehicle.factors.mass", "mass factor"),
         ("sensors.preset", "sensors: preset"),
         ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
         ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),
