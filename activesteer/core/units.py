@@ -194,7 +194,7 @@ def parameter_label(key: str) -> tuple[str, str]:
     stem, unit = split_ending(key)
     *tables, name = stem.split(".")
     within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
-    what = parameter_words(name)
+    what = parameter_words(name) + " factor" * (tables[-1:] == ["factors"])
     return f"{within}: {what}" if within else what, _POWER.sub(lambda power: "²³⁴⁵"[int(power[0]) - 2], unit.name)
 
 
@@ -216,6 +216,11 @@ _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 def typeset(text: str) -> str:
     """Return a text of numbers for a page, with minus signs, without a minus before zero, and with m/s²."""
     return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
+
+
+def three_digits(value: float) -> str:
+    """Return a number with three digits, or as a whole number from 100 on, typeset."""
+    return typeset(f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}")
 
 
 def _row(

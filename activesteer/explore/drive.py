@@ -35,6 +35,8 @@ _PEDAL_PER_S: Final = 4.0
 """Rate of the pedals [1/s]: a foot needs a quarter of a second for the whole way."""
 _LINE_EVERY: Final = 4
 """Steps of 0.5 m of a course's path between two points of the line that is painted on the road."""
+_CONE_S: Final = 2.0
+"""Time that each cone hit adds [s]: as in the autocross of Formula SAE and in SCCA Solo."""
 _PLANE: Final = "straight_line"
 
 
@@ -42,6 +44,7 @@ class DrivingCourse(NamedTuple):
     """A course for driving by hand: road, start speed and friction."""
 
     title: str  # its name in words
+    goal: str  # what there is to do, for a driver who sees it for the first time
     maneuver: Any  # manoeuvre whose road and course it has
     speed_kmh: float  # speed at the start [km/h]
     radius_m: float = 0.0  # radius of a circle to the left that begins at the start [m]; 0 for none
@@ -49,11 +52,30 @@ class DrivingCourse(NamedTuple):
 
 
 COURSES: Final = {
-    "lane_change": DrivingCourse("Double lane change", "double_lane_change", 70.0),
-    "slalom": DrivingCourse("Slalom", "slalom", 60.0),
-    "skid_pad": DrivingCourse("Skid pad, radius 40 m", _PLANE, 50.0, radius_m=40.0, mu=1.0),
-    "plane": DrivingCourse("Free plane, dry", _PLANE, 60.0, mu=1.0),
-    "slippery": DrivingCourse("Free plane, packed snow", _PLANE, 40.0, mu=0.3),
+    "lane_change": DrivingCourse(
+        "Double lane change",
+        f"Drive through the three lanes, as fast as you can. Each cone adds {_CONE_S:g} s.",
+        "double_lane_change",
+        70.0,
+    ),
+    "slalom": DrivingCourse(
+        "Slalom",
+        f"Drive along the dashed line, as fast as you can. Each cone adds {_CONE_S:g} s.",
+        "slalom",
+        60.0,
+    ),
+    "skid_pad": DrivingCourse(
+        "Skid pad, radius 40 m",
+        "Follow the white circle to the left, as fast as you can.",
+        _PLANE,
+        50.0,
+        radius_m=40.0,
+        mu=1.0,
+    ),
+    "plane": DrivingCourse("Free plane, dry", "Drive where you like, and switch the control.", _PLANE, 60.0, mu=1.0),
+    "slippery": DrivingCourse(
+        "Free plane, packed snow", "Make the car slide, and switch the control.", _PLANE, 40.0, mu=0.3
+    ),
 }
 """Name -> place to drive."""
 
@@ -201,6 +223,7 @@ class DriveSession:
         data = loop.vehicle.data
         fallen = self._hit_cones()
         self._time_laps()
+        penalty_s = _CONE_S * float(np.sum(~self._standing))
         speed_mps = math.hypot(motion.speed_mps, motion.lateral_speed_mps)
         sideslip_deg = math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if speed_mps > 1.0 else 0.0
         header = {
@@ -213,7 +236,9 @@ class DriveSession:
             "superposition_deg": math.degrees(loop.measurement.superposition_rad),
             "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
             "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
-            "cones": fallen, "lap_s": self._lap_s, "last_lap_s": self._last_lap_s, "missed": self._missed,
+            "cones": fallen, "penalty_s": penalty_s,
+            "lap_s": self._lap_s + penalty_s,
+            "last_lap_s": None if self._last_lap_s is None else self._last_lap_s + penalty_s, "missed": self._missed,
             "controller": self._names["controller"],
             "hold_kmh": None if self._driver.hold_mps is None else 3.6 * self._driver.hold_mps,
             "seen": self._seen, "behind_s": self._pacer.lost_s, "busy_ms": 1e3 * self._busy_s,

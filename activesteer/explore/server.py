@@ -41,7 +41,7 @@ HOST: Final = "127.0.0.1"
 TAKEN: Final = 4000, "This page was opened in another window. Reload it to go on here."
 """Code and reason with which the connection of a page ends when another window takes its place."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
-_OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js")
+_OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js", "touch.js")
 """Files that the page shares with the report."""
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; "

@@ -23,7 +23,7 @@ from activesteer.pages.model import Page, Section, Table, Text, failed, passed, 
 def render_page(page: Page) -> str:
     """Return a page as HTML."""
     charts = [picture_values(picture) for section in page.sections for picture in section.pictures]
-    scripts = ["uPlot.iife.min.js", "charts.js", *page.scripts] if charts or page.scripts else []
+    scripts = ["uPlot.iife.min.js", "touch.js", "charts.js", *page.scripts] if charts or page.scripts else []
     data = {"pictures": charts, **page.data}
     return _environment().get_template("document.html").render(page=page, scripts=scripts, data=data)
 

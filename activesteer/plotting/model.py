@@ -72,7 +72,7 @@ class Panel(NamedTuple):
         areas: Areas behind the curves.
         limits: Ordinates that a standard sets, with their names.
         names: Names of the ordinates 0, 1, ... from above, if the ordinates are not numbers.
-        notes: Abscissa, ordinate and text of notes, which hang below their points.
+        notes: Abscissa, ordinate and text of notes, which hang below their points, or beside them in named rows.
         log: Axes with a logarithmic scale: empty, `x` or `xy`.
         x_range: Least and greatest abscissa; None for what the curves need.
         y_range: Least and greatest ordinate, likewise.

@@ -36,6 +36,8 @@ _SLICES: Final = 20
 _SLICE_M: Final = 2.0
 """Length of the pieces in which a patch along a path is drawn [m], at most `_MAX_SLICES` of them."""
 _MAX_SLICES: Final = 200
+_EDGE_POINTS: Final = 31
+"""Points of the edge of an obstacle, so that a border of the drawing cuts a turned one within some centimetres."""
 _SHOWN_BESIDE_M: Final = 4.0
 """Width to either side of the path in which its friction is drawn [m]. It counts further out too."""
 
@@ -272,6 +274,21 @@ class Road:
             for piece in _sliced(index, area, 1 if area.slope_1pm == 0.0 else _SLICES, lambda x, y: (x, y))
         ]
 
+    def outlines(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[tuple[str, Array]]:
+        """Return words and corners [m] of the steps and bumps within a rectangle of the world."""
+        found = []
+        for it in self.obstacle:
+            if it.height_m is None or it.kind == "sine_wave":
+                continue
+            right, left = np.clip(it.borders, right_m, left_m)
+            d_m = np.linspace(right, left, _EDGE_POINTS)
+            near_m = it.start_m - math.tan(it.angle_rad) * d_m
+            far_m = near_m + (math.inf if it.length_m is None else it.length_m)
+            s_m = np.clip(np.concatenate([near_m, far_m[::-1]]), start_m, end_m)
+            corners_m = np.column_stack(self.placed(s_m, np.concatenate([d_m, d_m[::-1]])))
+            found.append((f"{it.kind.replace('_', ' ')} of {1e3 * it.height_m:.4g} mm", corners_m))
+        return found
+
 
 def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
     """Cut an area into slices, with `place` to turn its x and y into world coordinates."""
@@ -323,6 +340,10 @@ class LaidRoad(Road):
                 slices = min(_MAX_SLICES, math.ceil((shown.end_m - shown.start_m) / _SLICE_M))
                 found += _sliced(index, shown, slices, self.placed)
         return found
+
+    def outlines(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[tuple[str, Array]]:
+        """Return words and corners along the path, whatever the rectangle (see the base class)."""
+        return super().outlines(0.0, self.path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:

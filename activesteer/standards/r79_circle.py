@@ -20,7 +20,7 @@ from activesteer.config.faults import Fault, fault_table, fault_words
 from activesteer.controllers import system_of
 from activesteer.core.conventions import Array
 from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
-from activesteer.core.units import display_unit
+from activesteer.core.units import display_unit, three_digits
 from activesteer.errors import SimulationDiverged
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -230,11 +230,13 @@ def _dots(faults: list[dict[str, Any]]) -> Picture:
 
     def panel(figure: str, label: str) -> Panel:
         curves = []
-        for side, below, marker in zip(SIDES, (0.0, 0.2), "oD", strict=True):  # in rows
+        notes = []
+        for side, below, marker in zip(SIDES, (0.0, 0.3), "oD", strict=True):  # in rows
             own = [row for row in faults if row["direction"] == side and _named(row) in names]
             x, y = [_shown(row, figure) for row in own], [names.index(_named(row)) + below for row in own]
             curves.append(Curve(x, y, side, dashes="", marker=marker, size=6.0))
-        return Panel(label, "", curves, names=names)
+            notes += [(at, row, three_digits(at)) for at, row in zip(x, y, strict=True)]
+        return Panel(label, "", curves, names=names, notes=notes)
 
     panels = [
         panel("yaw_rate_change_radps", "yaw rate, change,\nhands fixed [deg/s]"),

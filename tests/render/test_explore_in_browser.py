@@ -208,6 +208,41 @@ def test_a_telephone_on_its_side_has_room_for_thumbs(browser: Browser, served: t
 
 
 @pytest.mark.slow
+def test_two_fingers_zoom_all_curves_and_a_double_tap_shows_the_whole_run(
+    browser: Browser, served: tuple[str, Path]
+) -> None:
+    page, problems = opened(browser, served[0] + "#maneuver=step_steer&controllers=none,ars", **PHONE)
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    page.tap("#play")
+    curve = page.locator(".u-over").nth(1)
+    curve.evaluate("(curve) => curve.scrollIntoView({ block: 'center' })")
+    box = curve.bounding_box()
+    assert box
+    fingers = page.context.new_cdp_session(page)
+
+    def touch(kind: str, *xs: float) -> None:
+        points = [{"x": box["x"] + x, "y": box["y"] + 60, "id": number} for number, x in enumerate(xs)]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    ends = "[...activesteer.curves.plots.values()].map(({ plot }) => `${plot.scales.x.min} to ${plot.scales.x.max}`)"
+    whole = page.evaluate(ends)
+    touch("touchStart", 80.0)
+    touch("touchStart", 80.0, 140.0)
+    for step in range(1, 11):
+        touch("touchMove", 80.0 - 5.0 * step, 140.0 + 8.0 * step)
+    touch("touchEnd")
+    zoomed = page.evaluate(ends)
+    assert len(set(zoomed)) == 1  # all curves show the same time
+    assert set(zoomed) != set(whole)
+    for _ in range(2):
+        touch("touchStart", 100.0)
+        touch("touchEnd")
+    assert page.evaluate(ends) == whole
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
 def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], **PHONE)
     page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)

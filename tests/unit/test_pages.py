@@ -42,7 +42,7 @@ def result(word: str) -> Validation:
 def test_names_in_a_validation_stay_text():
     studies = {EVIL: [Response(EVIL, *([1.0] * 6))]}
     evil = render_page(validation_page(result(EVIL), studies))
-    assert scripts(evil) == 3
+    assert scripts(evil) == 4
     assert "<img" not in evil
     assert evil.count('<div class="plots"') == 1
     assert 'class="outside"' in evil

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from activesteer.core.metric_table import METRICS
-from activesteer.core.units import parameter_title, quantity_of, typeset
+from activesteer.core.units import parameter_title, quantity_of, three_digits, typeset
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
@@ -48,6 +48,7 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("road.mu", "road: friction coefficient"),
         ("vehicle.controllers.ars.corrector.deadband_end_degps", "ARS corrector: deadband end [deg/s]"),
         ("load.cg_height_change_m", "centre of gravity height change [m]"),
+        ("vehicle.factors.mass", "mass factor"),
         ("sensors.preset", "sensors: preset"),
         ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
         ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),
@@ -68,3 +69,8 @@ def test_parameters_are_called_by_the_words_of_their_keys(key, title):
 )
 def test_zero_has_no_minus_sign_on_a_page(text, shown):
     assert typeset(text) == shown
+
+
+def test_a_page_gives_three_digits_and_whole_numbers_from_a_hundred_on():
+    texts = [three_digits(value) for value in (19.0, -0.05541, 1.1, 330.7, 1530.2, 0.0)]
+    assert texts == ["19.0", "\N{MINUS SIGN}0.0554", "1.10", "331", "1530", "0.00"]

@@ -22,7 +22,7 @@ from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, SYSTEMS, C
 from activesteer.analysis.source import RecordingLike, entry
 from activesteer.config import build, read_toml
 from activesteer.core.files import finite
-from activesteer.core.metric_table import recorded_metric
+from activesteer.core.metric_table import Form, recorded_metric
 from activesteer.errors import ParameterError, nearest_names
 
 LITERATURE: Final = "literature"
@@ -219,7 +219,11 @@ def number_lines(values: Mapping[str, float]) -> list[str]:
     lines = []
     for metric, pairs in by_metric.items():
         shown = recorded_metric(metric)
-        numbers = "  ".join(f"{system} {_number(value * shown.unit.factor)}".strip() for system, value in pairs)
+        texts = [
+            shown.text(value) if shown.form is Form.YES_OR_NO else _number(value * shown.unit.factor)
+            for _, value in pairs
+        ]
+        numbers = "  ".join(f"{system} {text}".strip() for (system, _), text in zip(pairs, texts, strict=True))
         lines.append(f"{shown.label}: {numbers} {shown.unit_name}".rstrip())
     return lines
 

@@ -29,8 +29,8 @@ MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
 """Distance from the course up to which the plot shows a car that leaves it [m]."""
-BESIDE_M: Final = 15.0
-"""Distance from the tracks up to which areas of a different friction are drawn [m]."""
+BESIDE_M: Final = 60.0
+"""Distance from the tracks up to which areas of a different friction and obstacles are drawn [m]."""
 DIGITS: Final = 4
 """Digits after the first digit of a signal's range. More cannot be seen."""
 
@@ -160,19 +160,19 @@ def _track(group: Group, grid: Array) -> dict[str, Any] | None:
         with suppress(RecordingError):  # an open-loop manoeuvre has no course
             course = course or read_course(run.recording)
     table = {"lanes": [], "cones": [], "path": None, "view": None} if course is None else _course(course, group)
-    return {"tracks": tracks, "patches": _patches(group, tracks), **table}
+    return {"tracks": tracks, **_road(group, tracks), **table}
 
 
-def _patches(group: Group, tracks: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the places of the road with another friction near the tracks: corners [m] and friction."""
+def _road(group: Group, tracks: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the places of another friction and the obstacles near the tracks: corners [m], friction or words."""
     ends = []
     for key in ("x", "y"):
         seen = [value for track in tracks for value in track[key] if value is not None]
         ends += [min(seen, default=0.0) - BESIDE_M, max(seen, default=0.0) + BESIDE_M]
-    return [
-        {"corners": np.round(piece.corners_m, 2).tolist(), "mu": round(piece.mu, 3)}
-        for piece in road_of(group.runs[0].recording.metadata).pieces(*ends)
-    ]
+    road = road_of(group.runs[0].recording.metadata)
+    patches = [{"corners": np.round(it.corners_m, 2).tolist(), "mu": round(it.mu, 3)} for it in road.pieces(*ends)]
+    obstacles = [{"corners": np.round(corners, 2).tolist(), "text": text} for text, corners in road.outlines(*ends)]
+    return {"patches": patches, "obstacles": obstacles}
 
 
 def _course(course: Course, group: Group) -> dict[str, Any]:

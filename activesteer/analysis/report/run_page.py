@@ -147,8 +147,12 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     """Return the sections of a manoeuvre: its results and plots, the claims about it, its metrics and parameters."""
     runs, found, titles = [run.recording for run in group.runs], results(group), list(key_figures(group))
     names = [run.name for run in group.runs]
-    changed = [*_changed(group), *_events(group)]
-    driven = Markup("Driven with <b>{}</b> in place of the manoeuvre's own.").format("; ".join(changed))
+    told_first: list[Text] = []
+    if changed := _changed(group):
+        words = Markup("Driven with <b>{}</b> in place of the manoeuvre's own.")
+        told_first.append(words.format("; ".join(changed)))
+    if events := _events(group):
+        told_first.append(Markup("Events: <b>{}</b>.").format("; ".join(events)))
     judged = any(each["losses"] or each["kept"] for each in found)
     rows = [
         [_swatch(each["run"].look) + each["run"].look.label, *([_outcome(each)] if judged else []),
@@ -170,7 +174,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
         for item in card.judged
     ]  # fmt: skip
     first = Section(
-        title, [driven] if changed else [], [compared] if len(heads) > 1 else [], verdicts, kind="verdicts",
+        title, told_first, [compared] if len(heads) > 1 else [], verdicts, kind="verdicts",
         anchor=anchor,
     )  # fmt: skip
     details = [_claim(item, anchor) for item in card.judged]
@@ -250,7 +254,7 @@ def _events(group: Group) -> list[str]:
     """Return the events during the runs, one line for each run."""
     listed = {run.name: events_of(run.recording.metadata) for run in group.runs}
     return [
-        f"{name}, on the way: {', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
+        f"{name}: {', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
         + (f" and {len(events) - _MOST_EVENTS} more" if len(events) > _MOST_EVENTS else "")
         for name, events in listed.items()
         if events
@@ -398,7 +402,11 @@ def metric_rows(group: Group) -> list[list[Text]]:
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
-        cells: list[Text] = [metric.label, metric.unit_name, texts[0]]
+        cells: list[Text] = [
+            Markup('<span title="{}">{}</span>').format(name, metric.label),
+            metric.unit_name,
+            texts[0],
+        ]
         for value, text in zip(others, texts[1:], strict=True):
             compared = difference_text(name, value, first) if LOST not in (text, texts[0]) else Cell("\N{EN DASH}")
             percent = Markup('{} <span class="quiet">({})</span>').format(*compared)

@@ -57,7 +57,7 @@ export class Curves {
   // Let another part of the grid be as high as some rows of curves.
   besides(part) {
     const row = HEIGHT + 36, columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length;
-    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.ceil((part.firstElementChild.offsetHeight - 40) / row))}` : "";
+    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.round(part.firstElementChild.offsetHeight / row))}` : "";
   }
 
   // New curves have their scales in the next frame.
@@ -97,8 +97,11 @@ export class Curves {
   panel(title, panel, lines, data) {
     const key = JSON.stringify(lines);
     let shown = this.plots.get(title);
-    const zoomed = shown && zoomOf(shown.plot), unit = [panel.unit, panel.note].filter(Boolean).join(", ");
-    if (shown) shown.unit.textContent = unit;
+    const zoomed = shown && zoomOf(shown.plot), told = (one) => {
+      one.unit.textContent = [panel.unit, panel.note].filter(Boolean).join(", ");
+      one.unit.parentElement.className = lines.some(({ dotted }) => dotted) ? "many" : ""; // values have a line for themselves
+    };
+    if (shown) told(shown);
     if (shown && shown.key === key) {
       shown.plot.setData(data);
       if (zoomed) shown.plot.setScale("x", zoomed);
@@ -106,10 +109,11 @@ export class Curves {
     }
     if (!shown) {
       const values = element("span", { class: "quiet" }), holder = element("div", { role: "img", "aria-label": `${title} over time` });
-      const said = element("span", { class: "unit" }, unit), figure = element("div", {}, element("p", {}, element("b", {}, title), said, values), holder);
+      const said = element("span", { class: "unit" }), figure = element("div", {}, element("p", {}, element("b", {}, title), said, values), holder);
       this.box.append(figure);
       shown = { figure, holder, values, unit: said };
       this.plots.set(title, shown);
+      told(shown);
       holder.addEventListener("mouseleave", () => this.again()); // back to the time of the pictures
     } else shown.plot.destroy();
     shown.key = key;
@@ -122,18 +126,24 @@ export class Curves {
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), auto: !line.ghost, width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
       hooks: { drawAxes: [(u) => this.marks(u)], setCursor: [(u) => {
         const i = u.cursor.idx;
-        shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost || line.dotted ? [] : [element("span", { style: `border-bottom: 2px solid ${runColour(line.place)}` }, number(u.data[k + 1][i])), " "]))]));
+        const valueOf = (line, k) => element("span", { style: `border-bottom: 2px ${line.dotted ? "dotted" : "solid"} ${runColour(line.place)}` }, number(u.data[k + 1][i]));
+        shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost ? [] : [valueOf(line, k), " "]))]));
         if (i != null && u.cursor.event && !this.marking) this.pointed(this.time = u.data[0][i]);
       }] },
     }, data, shown.holder);
     if (zoomed) shown.plot.setScale("x", zoomed);
-    // A finger that slides reads values; up and down the page still scrolls.
-    const { over } = shown.plot;
-    for (const name of ["pointerdown", "pointermove"]) over.addEventListener(name, (event) => {
-      if (event.pointerType !== "touch") return;
-      shown.plot.setCursor({ left: event.clientX - over.getBoundingClientRect().left, top: 1 });
-      this.pointed(this.time = shown.plot.data[0][shown.plot.cursor.idx ?? 0]);
+    touchable(shown.plot, (range) => this.zoom(range));
+    for (const name of ["pointerdown", "pointermove"]) shown.plot.over.addEventListener(name, (event) => {
+      if (event.pointerType === "touch" && event.isPrimary) this.pointed(this.time = shown.plot.data[0][shown.plot.cursor.idx ?? 0]);
     });
+  }
+
+  // Show some of the time, or the whole run if it is all of it.
+  zoom(range) {
+    const [{ plot: { data: [time] } }] = this.plots.values();
+    if (!range || (range.min <= time[0] && range.max >= time.at(-1))) this.whole();
+    else for (const { plot } of this.plots.values()) plot.setScale("x", { min: Math.max(range.min, time[0]), max: Math.min(range.max, time.at(-1)) });
+    this.again();
   }
 
   // Show the whole run again.
@@ -188,17 +198,23 @@ export class Track {
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (const [x, y] of all) { left = Math.min(left, x); right = Math.max(right, x); low = Math.min(low, y); high = Math.max(high, y); }
     [left, right, low, high] = [left - 6, right + 6, low - 3, high + 3];
+    pen.font = FONT;
+    const frictions = [...new Set([mu, ...course.patches.map((patch) => patch.mu)])].filter((one) => slippery(one)).slice(0, 3);
+    const words = [`from above, ${Math.round(right - left)} m`, course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, ...new Set(course.obstacles.map(({ text }) => text))].filter(Boolean);
+    const inRows = (parts) => parts.reduce((rows, part) => (rows.length && pen.measureText(`${rows.at(-1)}; ${part}`).width <= width - 20 ? [...rows.slice(0, -1), `${rows.at(-1)}; ${part}`] : [...rows, part]), []);
+    const foot = 15 * inRows([...words, "cars and widths are 1.0 times larger"]).length;
     // A car has its shape. Widths have the scale of the cars, so that their distances from cones and lanes are true.
     const ends = tracks.flatMap((track) => track.tracks).find(({ car }) => car)?.car.ends ?? [0, 4], length = ends[1] - ends[0];
-    const fit = (height - 34) / (high - low), zoomX = Math.min((width - 20) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
+    const fit = (height - foot - 20) / (high - low), zoomX = Math.min((width - 20) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
     const zoom = Math.max(zoomY, LEAST_CAR_PX / length);
-    const place = (x, y) => [width / 2 + (x - (left + right) / 2) * zoomX, (height - 14) / 2 - (y - (low + high) / 2) * zoomY];
+    const place = (x, y) => [width / 2 + (x - (left + right) / 2) * zoomX, (height - foot) / 2 - (y - (low + high) / 2) * zoomY];
     const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };
-    pen.font = FONT;
     pen.fillStyle = paint("patch");
     for (const { corners, mu } of course.patches) { pen.globalAlpha = slippery(mu); pen.beginPath(); for (const [x, y] of corners) pen.lineTo(...place(x, y)); pen.fill(); }
     pen.globalAlpha = 1;
     pen.fillStyle = paint("lane");
+    pen.strokeStyle = paint("quiet");
+    for (const { corners } of course.obstacles) { pen.beginPath(); for (const [x, y] of corners) pen.lineTo(...place(x, y)); pen.closePath(); pen.fill(); pen.stroke(); }
     for (const lane of course.lanes) {
       const [start, end] = lane.x, [below, above] = lane.y;
       pen.beginPath();
@@ -236,10 +252,6 @@ export class Track {
     }
     pen.fillStyle = paint("quiet");
     const stretch = zoomY / zoomX;
-    const frictions = [...new Set([mu, ...course.patches.map((patch) => patch.mu)])].filter((one) => slippery(one)).slice(0, 3);
-    const caption = [`from above, ${Math.round(right - left)} m`, course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, stretch > 1.05 && `cars and widths are ${stretch.toFixed(1)} times larger`].filter(Boolean);
-    const rows = [[]];
-    for (const part of caption) { if (rows.at(-1).length && pen.measureText([...rows.at(-1), part].join("; ")).width > width - 20) rows.push([]); rows.at(-1).push(part); }
-    rows.reverse().forEach((row, i) => pen.fillText(row.join("; "), 10, height - 7 - 15 * i));
+    inRows([...words, ...(stretch > 1.05 ? [`cars and widths are ${stretch.toFixed(1)} times larger`] : [])]).reverse().forEach((row, i) => pen.fillText(row, 10, height - 7 - 15 * i));
   }
 }

@@ -1,5 +1,5 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, inWords, number, offer, option, small } from "./look.js";
+import { courses, element, explained, inWords, number, offer, option, small } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
@@ -7,7 +7,7 @@ const KEYS = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", Ar
 const SWITCH = ["none", "ars", "afs", "lqr", "esc"], DEAD = 0.06;
 const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for full steering, as a share of its width
 const short = matchMedia("(max-height: 450px)");
-const PLAIN = ["speed", "sideslip", "grip", "rear", "time", "cones"]; // gauges that a phone shows
+const PLAIN = ["speed", "sideslip", "grip used", "rear steer", "time", "cones"]; // gauges that a phone shows
 
 export class Drive {
   constructor(socket, say) {
@@ -59,7 +59,7 @@ export class Drive {
 
   offer(names) {
     $("drive-vehicle").replaceChildren(...names.vehicles.map((name) => option(name)));
-    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, names.titles[name] ? `${name}: ${names.titles[name].split(/[:;]| \(/)[0]}` : name)));
+    $("drive-controller").replaceChildren(...names.controllers.map((name) => option(name, explained(name, names.titles))));
     this.choose({});
   }
 
@@ -93,6 +93,7 @@ export class Drive {
   // Speed and friction of the course, until they are moved.
   ofCourse() {
     const course = courses[$("course").value];
+    for (const goal of document.querySelectorAll(".goal")) goal.textContent = course.goal;
     this.startAt(course.speed_kmh, course.mu);
   }
 
@@ -139,7 +140,7 @@ export class Drive {
     this.ghost = this.ghosts.get(this.setting);
     if (this.ghost) this.scene.car("ghost", 0, 0.35);
     this.frames = [];
-    this.struck = this.passed = 0;
+    this.struck = this.passed = this.penalty_s = 0;
     this.previous = null;
     $("waiting").hidden = false;
     $("start").disabled = false;
@@ -201,8 +202,9 @@ export class Drive {
     const hands = this.pad() ?? (keys.steer || keys.throttle || keys.brake ? keys : { ...this.touch, direct: true });
     const text = JSON.stringify(hands);
     if (text === this.last) return;
+    this.number += 1;
+    if (this.last) this.sent.set(this.number, performance.now()); // the first ones are at rest
     this.last = text;
-    this.sent.set(++this.number, performance.now());
     this.act({ ...hands, number: this.number });
   }
 
@@ -228,6 +230,7 @@ export class Drive {
     this.frames.push({ time_s, poses });
     this.lap_s = header.last_lap_s;
     this.missed = header.missed;
+    this.penalty_s = header.penalty_s;
     for (const cone of header.cones) { this.struck += 1; scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
     if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(header.hold_kmh); }
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
@@ -243,20 +246,22 @@ export class Drive {
   gauges(header) {
     const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
-      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, grip: `${number(100 * header.friction_use, 0)} %`,
-      time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: `${this.struck}`,
-      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, rear: `${number(header.rear_deg, 1)}°`,
-      "front added": `${number(header.superposition_deg, 1)}°`, control: header.controller,
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
+      time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg, 1)}°`,
+      "front steer added": `${number(header.superposition_deg, 1)}°`, control: header.controller,
     };
     if (!$("gauges").children.length) {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
-    $("gauges").children[Object.keys(rows).indexOf("cones")].hidden = !this.scene.cones.length;
+    const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
+    gauge("cones").hidden = !cones;
+    gauge("rear steer").hidden = cones && small.matches; // a phone has no room for both
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
-    $("gauges").title = "grip: used share of the friction of the tyre that uses most; rear, front added: angles at the wheels; cones: hit. " + (this.timed ? "time: of this lap, or since the first gate; behind the stroke, that of the ghost; missed: a gate was missed" : "");
+    $("gauges").title = "grip used: share of its friction that the busiest tyre uses; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the ghost; missed: a gate was missed" : "");
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 
@@ -278,13 +283,14 @@ export class Drive {
     const same = this.compared && String(this.address) === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
-    const cones = this.scene.cones.length ? ` ${["No cone", "1 cone"][this.struck] ?? `${this.struck} cones`} hit.` : "";
-    const timed = lap ? ` ${this.way}: ${number(lap, 2)} s${faster}.` : this.missed ? " No time: a gate was missed." : this.rounds ? " No complete lap." : "";
+    const count = ["no cone", "1 cone"][this.struck] ?? `${this.struck} cones`;
+    const cones = !this.scene.cones.length ? "" : !lap || !this.struck ? `, ${count} hit` : `, with ${number(this.penalty_s, 0)} s for ${count}`;
+    const timed = lap ? `${this.way}: ${number(lap, 2)} s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: the last gate was not passed${cones}. ` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
     if (this.shown && this.ready) this.prepare();
     // A small screen has no room for what few want to know.
-    $("driven").replaceChildren(`${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.${timed}${cones}`, element("span", { class: "more" }, latency),
+    $("driven").replaceChildren(`${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     if (header.error) this.say(header.error);
     else if (!this.shown) this.say(`The drive has ended. It is saved as ${header.file}.`, true);

@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { colourCount, dark, element, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
+import { colourCount, dark, element, explained, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -19,7 +19,7 @@ export function say(text, hint = false) {
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
-const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0 };
+const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
 window.activesteer = state; // for tests and the curious
 
 const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); $("start").disabled = true; });
@@ -65,6 +65,8 @@ function writeAddress() {
   if (drive.shown) return; // it has its own
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
+  $("reset").disabled = !Object.keys(state.values).length;
+  $("explained").textContent = controllers.map((name) => explained(name, state.titles)).join("; ");
   $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
 }
 
@@ -125,7 +127,12 @@ const hear = {
     if (header.id !== state.id) return;
     showTitle(header.title);
     state.sliders = header.sliders;
-    for (const { key, low, high } of header.sliders) if (key in state.wanted) state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
+    const limited = [];
+    for (const { key, label, unit, low, high } of header.sliders) if (key in state.wanted) {
+      state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
+      if (state.values[key] !== +state.wanted[key]) limited.push(`${label} ${state.wanted[key]} is outside ${low} to ${high} ${unit}`.trim());
+    }
+    if (limited.length) say(`${limited.join("; ")}. The nearest value is driven.`, true);
     state.wanted = {};
     showSliders();
     scene.setShape(header.shape, arrays);
@@ -207,14 +214,20 @@ function placeOf({ name, place }) {
   return places.get(name);
 }
 
-const swatchOf = (run) => element("i", { class: "swatch", style: `background:${runColour(run.place)}` });
+// A piece of the line of a run, with its colour and its dashes.
+function strokeOf(run) {
+  let at = 0;
+  const parts = (run.dashes ?? []).map((length, i) => `${i % 2 ? "transparent" : runColour(run.place)} ${at}px ${at += 1.5 * length}px`);
+  return parts.length ? `repeating-linear-gradient(90deg, ${parts.join(", ")})` : runColour(run.place);
+}
+const swatchOf = (run) => element("i", { class: "swatch", style: `background:${strokeOf(run)}` });
 const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
 
 // Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own.
 function showColours() {
   for (const [name, swatch] of swatches) {
     const run = state.runs.get(name);
-    swatch.setAttribute("style", run ? `background:${runColour(run.place)}` : "visibility:hidden"); // its place stays
+    swatch.setAttribute("style", run ? `background:${strokeOf(run)}` : "visibility:hidden"); // its place stays
   }
   $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
 }
@@ -235,7 +248,8 @@ function showFigures() {
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);
     return element("td", {}, number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
-  if (runs.some((run) => run.losses.length)) rows.unshift(element("tr", {}, element("th", {}, "Fails"), ...runs.map((run) => element("td", {}, run.losses.join("; ")))));
+  const failed = runs.filter((run) => run.losses.length);
+  rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("th", {}, swatchOf(run), `${shortName(run)} fails`), element("td", { colspan: runs.length }, run.losses.join("; ")))));
   $("figures").classList.toggle("many", runs.length > 2);
   $("figures").replaceChildren(head, ...rows);
   curves.besides($("figures").parentElement);

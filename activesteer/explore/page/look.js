@@ -32,6 +32,11 @@ export const element = (name, attributes = {}, ...children) => {
 
 // A name of the package in words; a file keeps its name.
 export const inWords = (name) => (name.includes(".") ? name : name.replaceAll("_", " "));
+// A controller with the beginning of its title, such as `ars: active rear steering`.
+export function explained(name, titles) {
+  const title = (titles[name] ?? "").split(/[:;]| \(/)[0];
+  return title ? `${name}: ${title.replace(/^[A-Z](?=[a-z ])/, (letter) => letter.toLowerCase())}` : name;
+}
 export const option = (name, text = inWords(name)) => element("option", { value: name }, text);
 // Choose a name in a list; the program answers a name that it does not know.
 export function offer(list, name) {

@@ -65,37 +65,6 @@ function swatchOf(colour, dashes, marker = "") {
   return swatch;
 }
 
-// One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
-function touchable(u, zoom) {
-  const over = u.over, fingers = new Map();
-  let start = null, tapped = 0;
-  const at = (event) => event.clientX - over.getBoundingClientRect().left;
-  over.addEventListener("pointerdown", (event) => {
-    if (event.pointerType !== "touch") return;
-    fingers.set(event.pointerId, at(event));
-    if (fingers.size === 2) {
-      const [a, b] = [...fingers.values()].sort((p, q) => p - q);
-      start = { a: u.posToVal(a, "x"), b: u.posToVal(b, "x") };
-    } else if (fingers.size === 1) {
-      if (event.timeStamp - tapped < 300) zoom(null);
-      tapped = event.timeStamp;
-    }
-  });
-  over.addEventListener("pointermove", (event) => {
-    if (!fingers.has(event.pointerId)) return;
-    fingers.set(event.pointerId, at(event));
-    if (fingers.size === 1) u.setCursor({ left: at(event), top: event.clientY - over.getBoundingClientRect().top }, true, true);
-    if (fingers.size !== 2 || !start) return;
-    const [a, b] = [...fingers.values()].sort((p, q) => p - q);
-    if (b - a < 10) return;
-    const scale = (start.b - start.a) / (b - a), min = start.a - a * scale;
-    zoom({ min, max: min + over.clientWidth * scale });
-  });
-  for (const name of ["pointerup", "pointercancel"]) {
-    over.addEventListener(name, (event) => { fingers.delete(event.pointerId); if (fingers.size < 2) start = null; });
-  }
-}
-
 const onDark = () => DARK.matches && !document.documentElement.classList.contains("paper");
 const channels = (colour) => [1, 3, 5].map((start) => parseInt(colour.slice(start, start + 2), 16));
 const blend = (one, other, share) => `#${one.map((part, i) => Math.round(part + share * (other[i] - part)).toString(16).padStart(2, "0")).join("")}`;
@@ -133,7 +102,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? 32) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length ? 40 : 32)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
@@ -249,10 +218,17 @@ class Chart {
     for (const [value] of panel.limits) level(py(value));
     ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
-    for (const [x, y, text, colour] of panel.notes) { ctx.fillStyle = colour || paint.ink; ctx.fillText(text, px(x), py(y) + 3 * dpr); }
+    for (const [x, y, text, colour] of panel.notes) {
+      ctx.fillStyle = colour || paint.ink;
+      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + 3 * dpr); continue; }
+      // A point in a row has its value beside it, where there is room.
+      const before = px(x) > bbox.left + 0.8 * bbox.width;
+      ctx.textAlign = before ? "right" : "left"; ctx.textBaseline = "middle";
+      ctx.fillText(text, px(x) + (before ? -7 : 7) * dpr, py(y));
+    }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 5 * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 7 * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 
@@ -369,7 +345,7 @@ function drawPicture(box, picture, place) {
 // One button and one slider for all curves over time of a page, which stay in sight.
 function addPlayer(charts) {
   const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
-  if (!timed.length) return;
+  if (2 * timed.length < charts.length || !timed.length) return; // not what the page shows
   let start_s = Infinity, end_s = -Infinity;
   for (const time_s of timed.flatMap(({ panel }) => panel.curves.flatMap((curve) => curve.x))) if (time_s != null) { start_s = Math.min(start_s, time_s); end_s = Math.max(end_s, time_s); }
   if (!(end_s > start_s)) return;
@@ -397,7 +373,7 @@ function addContents() {
   if (sections.length < LEAST_SECTIONS) return;
   sections.forEach((section, i) => { section.id ||= `part-${i + 1}`; });
   const links = sections.map((section) => element("a", { href: `#${section.id}` }, section.querySelector("h2").textContent));
-  const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Contents"), ...links);
+  const bar = element("nav", { class: "jump", "aria-label": "Contents" }, element("a", { href: "#contents" }, "Top"), ...links);
   document.querySelector("#contents").after(bar);
   // On a wide screen the links take as many lines as they need; what stays in sight below them follows.
   new ResizeObserver(() => document.querySelector("main").style.setProperty("--jump", `${bar.offsetHeight}px`)).observe(bar);

@@ -247,6 +247,7 @@
         ...(stretch > 1.05 || stretch < 0.95 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : []),
         ...(covers ? ["shaded: width of the bodies"] : []),
         ...(this.data.patches.length ? [`blue: friction ${[...new Set(this.data.patches.map(({ mu }) => mu))].slice(0, 3).join(", ")}`] : []),
+        ...new Set(this.data.obstacles.map(({ text }) => `bordered: ${text}`)),
         ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
       ].join(", ");
       ctx.save();
@@ -254,7 +255,8 @@
       ctx.lineJoin = "round";
       ctx.fillStyle = paint.patch;
       for (const { corners } of this.data.patches) { ctx.beginPath(); for (const [x, y] of corners) ctx.lineTo(px(x), py(y)); ctx.fill(); }
-      ctx.fillStyle = paint.lane;
+      ctx.fillStyle = paint.lane; ctx.strokeStyle = paint.path; ctx.lineWidth = dpr;
+      for (const { corners } of this.data.obstacles) { ctx.beginPath(); for (const [x, y] of corners) ctx.lineTo(px(x), py(y)); ctx.closePath(); ctx.fill(); ctx.stroke(); }
       for (const { x, y } of this.data.lanes) ctx.fillRect(px(x[0]), py(y[1]), px(x[1]) - px(x[0]), py(y[0]) - py(y[1]));
       const line = ({ x, y }, colour, width, dash) => {
         ctx.strokeStyle = colour; ctx.lineWidth = width * dpr; ctx.setLineDash(dash.map((length) => length * dpr));

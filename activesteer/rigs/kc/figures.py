@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from activesteer.core.conventions import Array
-from activesteer.core.units import typeset
+from activesteer.core.units import three_digits, typeset
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
@@ -110,7 +110,7 @@ def _metric_row(entry: KcMetric) -> list[Text]:
         Markup('<span title="{}">{}</span>').format(
             entry.definition, entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
         ),
-        f"{value:.4g}" if math.isfinite(value) else "none",
+        three_digits(value) if math.isfinite(value) else "none",
         entry.unit,
         f"{entry.band[0]:g} to {entry.band[1]:g}" if entry.band else "",
         {None: "", True: passed("inside", chip=True), False: failed("outside", chip=True)}[entry.inside],
@@ -296,17 +296,19 @@ def _ideal_outer_deg(axle: Axle, inner_deg: Array) -> Array:
 def _targets(result: KcResult) -> Picture:
     """Position of each metric within its target band."""
     rows = [entry for entry in result.metrics if entry.band is not None]
+    places = [min(max(_place(entry), -_FURTHEST), 1.0 + _FURTHEST) for entry in rows]
     curves = [
         Curve(
-            [min(max(_place(entry), -_FURTHEST), 1.0 + _FURTHEST)], [float(number)], "",
+            [places[number]], [float(number)], "",
             _THIRD if entry.inside else _RIGHT, "", marker="o" if entry.inside else "D", size=6.0,
         )
         for number, entry in enumerate(rows)
     ]  # fmt: skip
     x_label = "place in the target band: 0 lowest, 1 highest"
     band = Area([0.0, 1.0], -0.9, len(rows) - 0.3, "", "#d5ead9")
-    names = [_row_name(entry) for entry in rows]
-    panel = Panel(x_label, "", curves, areas=[band], names=names, x_range=(-0.7, 1.7))
+    names = [_row_name(entry, told=False) for entry in rows]
+    notes = [(places[number], float(number), three_digits(entry.value)) for number, entry in enumerate(rows)]
+    panel = Panel(x_label, "", curves, areas=[band], names=names, notes=notes, x_range=(-0.7, 1.7))
     return Picture("target bands", [panel], width_in=8.5, height_in=1.2 + 0.24 * len(rows))
 
 
@@ -316,8 +318,8 @@ def _place(entry: KcMetric) -> float:
     return (entry.value - low) / (high - low) if high > low else 0.5
 
 
-def _row_name(entry: KcMetric) -> str:
+def _row_name(entry: KcMetric, *, told: bool = True) -> str:
     assert entry.band is not None
     name = entry.name.removeprefix(f"{entry.axle}_").replace("_", " ")
     band = f"{entry.band[0]:g} to {entry.band[1]:g} {entry.unit}".removesuffix(" -")
-    return typeset(f"{entry.axle}  {name}  {entry.value:.4g} ({band})")
+    return typeset(f"{entry.axle}  {name}{f'  {three_digits(entry.value)}' if told else ''} ({band})")

@@ -60,7 +60,7 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
     title, data = study.title or name, _data(study, table)
     counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
     parts = (("Manoeuvres", "maneuver"), ("Vehicles", "vehicle"), ("Controllers", "controller"))
-    driven = " ".join(f"{word}: {', '.join(table[part].unique().to_pylist())}." for word, part in parts)
+    driven = " ".join(f"{word}: {', '.join(map(_words, table[part].unique().to_pylist()))}." for word, part in parts)
     lead: list[Text] = [f"{progress.done} of {progress.total} runs: {counts}. {driven}", *_finding(data)]
     lead += [
         Markup("Without effect: <code>{}</code> changes no metric of any run.").format(key)
@@ -78,9 +78,14 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
     tables.append(Table("Factors", columns, factors, folded=len(factors) > _FACTORS, note=note))
     sections = [
         Section(tables=tables, anchor="study"),
-        Section("The study", [Markup('<code class="file">{}</code>').format(study.to_toml())]),
+        Section("File of the study", [Markup('<code class="file">{}</code>').format(study.to_toml())]),
     ]
     return Page(title, title, lead, sections, ["study.js"], data)
+
+
+def _words(name: str) -> str:
+    """Return a name of the package in words; a file keeps its name."""
+    return name if "." in name else name.replace("_", " ")
 
 
 def _finding(data: Mapping[str, Any]) -> list[Text]:
@@ -94,8 +99,8 @@ def _finding(data: Mapping[str, Any]) -> list[Text]:
         found = [(_correlation(*pair[:, own & np.isfinite(pair).all(axis=0)]), label) for label, pair in pairs]
         value, most = max(found, key=lambda pair: abs(pair[0]), default=(0.0, ""))
         told += [f"{most} with {controller} ({typeset(f'{value:.2f}')})"] if value else []
-    words = f"largest rank correlation of the {recorded_metric(name or '').label}: {', '.join(told)}"
-    return [f"{data['groups'][0]}: {words}."] if told else []
+    words = f"{recorded_metric(name or '').label} depends most on {', '.join(told)}"
+    return [f"{data['groups'][0]}: {words}. Values in brackets are rank correlations."] if told else []
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
@@ -113,7 +118,7 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
         "controllers": who["controller"][0],
         "places": [run_looks(who["controller"][0])[name].place for name in who["controller"][0]],
         "first": _FIRST,
-        "groups": [f"{who['maneuver'][0][m]}, {who['vehicle'][0][v]}" for m, v in groups],
+        "groups": [f"{_words(who['maneuver'][0][m])}, {_words(who['vehicle'][0][v])}" for m, v in groups],
         "metrics": [{"name": metric.name, "label": metric.label, "unit": metric.unit.name} for metric in found],
         "factors": [_factor(study, key, table[key]) for key in study.keys],
         "rows": {

@@ -33,7 +33,7 @@ export const element = (name, attributes = {}, ...children) => {
   return made;
 };
 export const offer = (list, name) => { list.value = name; };
-export const inWords = (name) => name, option = (name) => element("option", { value: name });
+export const inWords = (name) => name, explained = inWords, option = (name) => element("option", { value: name });
 export { number } from "./number.mjs";
 
 export const names = ["none", "ars", "afs", "lqr", "esc"];

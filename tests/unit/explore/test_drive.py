@@ -136,6 +136,20 @@ def test_a_car_that_drives_straight_on_hits_cones_once_and_leaves_the_others(tmp
     car.end()
 
 
+def test_each_cone_that_is_hit_adds_two_seconds_to_the_time(tmp_path: Path) -> None:
+    car = drive("slalom", tmp_path)
+    before, hits = car.frame().header, 0
+    while (header := car.frame().header)["time_s"] < 7.0:
+        hits += len(header["cones"])
+        assert header["penalty_s"] == 2.0 * hits
+        if before["lap_s"] > before["penalty_s"]:  # behind the first gate
+            added_s = header["lap_s"] - before["lap_s"] - (header["time_s"] - before["time_s"])
+            assert added_s == pytest.approx(2.0 * len(header["cones"]), abs=2e-3)
+        before = header
+    assert hits > 0
+    car.end()
+
+
 def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
     slalom, lane_change = drive("slalom", tmp_path), drive("lane_change", tmp_path)
     start, other = (next(car.start()).header for car in (slalom, lane_change))

@@ -11,6 +11,7 @@ from activesteer.core.path import Path
 from activesteer.errors import ManeuverError
 from activesteer.road.course import Course
 from activesteer.road.native_path import PathGrid, along_path
+from activesteer.road.obstacles import Obstacle
 from activesteer.road.road import Road, RoadPatch
 
 
@@ -93,3 +94,18 @@ def test_patches_along_a_path_are_drawn_along_it_and_need_one() -> None:
         Road(0.9, mu_left=0.5, along="path").laid(None)
     with pytest.raises(ManeuverError, match="no effect"):
         Road(0.9, along="path")
+
+
+def test_a_kerb_is_drawn_at_its_angle_and_a_cleat_along_the_path() -> None:
+    kerb = Obstacle("kerb", 8.0, height_m=0.06, angle_rad=math.radians(-70.0))
+    ((words, corners),) = Road(0.9, obstacle=(kerb,)).outlines(0.0, 30.0, -2.5, 3.0)
+    assert words == "kerb of 60 mm"
+    x, y = corners.T
+    edge = y[x < 29.9], x[x < 29.9]
+    assert np.polyfit(*edge, 1) == pytest.approx([math.tan(math.radians(70.0)), 8.0])
+    assert (x.max(), y.min(), y.max()) == (30.0, -2.5, 3.0)
+    turn = np.linspace(0.0, math.pi, 100)
+    course = Course(Path.through(50.0 * np.sin(turn), 50.0 * (1.0 - np.cos(turn))))
+    cleat = Obstacle("cleat", 25.0 * math.pi, length_m=0.4, height_m=0.02)
+    ((_, corners),) = Road(0.9, obstacle=(cleat,), along="path").laid(course).outlines(0.0, 1.0, 0.0, 1.0)
+    assert corners[0] == pytest.approx([54.0, 50.0], abs=0.02)  # across the path, which goes to the left there
