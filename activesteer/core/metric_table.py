@@ -101,7 +101,68 @@ class Metric(NamedTuple):
         return -value if self.better is Better.HIGHER else value
 
 
-_WORDS: Final = {"ay": "lateral acceleration", "tb": "TB factor"}
+_QUANTITIES: Final = {
+    "ay": "lateral acceleration",
+    "sideslip": "sideslip angle",
+    "roll": "roll angle",
+    "steering_wheel": "steering wheel angle",
+    "front_steer": "front steer angle",
+    "rear_steer": "rear steer angle",
+    "superposition": "superposition angle",
+    "added_rear_steer": "added rear steer angle",
+    "added_superposition": "added superposition angle",
+}
+"""Quantity in names of metrics -> its words, if they differ."""
+_ENDS: Final = {
+    "_after_gates_rms": "{} after the gates, RMS",
+    "_gates_rms": "{} between the gates, RMS",
+    "_end_rms": "{} at the end, RMS",
+    "_rms": "{}, RMS",
+    "_peak_abs": "largest {}",
+    "_reversal_peak": "peak {} after the reversal",
+    "_peak": "peak {}",
+    "_steady_state": "steady-state {}",
+    "_after_1000ms_share": "{} remaining after 1.00 s",
+    "_after_1750ms_share": "{} remaining after 1.75 s",
+    "_after_1000ms": "{} after 1.00 s",
+    "_begin": "initial {}",
+    "_end": "final {}",
+    "_max": "largest {}",
+    "_min": "least {}",
+    "_mean": "mean {}",
+}
+"""End of a name -> label with the quantity; the first that fits counts."""
+_LABELS: Final = {
+    "tb": "TB factor",
+    "steering_wheel_at_0_3g": "steering wheel angle at 0.3 g",
+    "steering_wheel_max_rate": "largest steering wheel rate",
+    "yaw_rate_phase_at_1Hz": "yaw rate phase at 1 Hz",
+    "ay_phase_at_1Hz": "lateral acceleration phase at 1 Hz",
+    "roll_phase_at_1Hz": "roll phase at 1 Hz",
+    "yaw_rate_45deg": "yaw rate frequency at 45 deg of lag",
+    "yaw_rate_peak_gain": "frequency of the largest yaw rate gain",
+    "yaw_rate_peak_gain_ratio": "largest yaw rate gain, relative",
+    "steer_begin_time": "steering start time",
+    "steer_reversal_time": "steering reversal time",
+    "steer_completion_time": "steering completion time",
+    "braking_begin_time": "braking start time",
+    "yaw_rate_reversal_peak_time": "yaw rate peak time after the reversal",
+    "stopping_distance_corrected": "corrected stopping distance",
+    "lateral_displacement_by_ay": "lateral displacement by acceleration",
+    "track_difference_none_ars": "track difference, none and ars",
+    "track_difference_none_afs": "track difference, none and afs",
+    "track_difference_ars_afs": "track difference, ars and afs",
+    "entry_speed_min": "entry speed, lower bound",
+    "entry_speed_max": "entry speed, upper bound",
+    "ackermann_gradient": "Ackermann gradient",
+    "two_wheel_lift_time": "time on two wheels",
+    "wheel_lift_share": "time with a lifted wheel",
+    "extended_road_share": "time beyond the known road",
+    "added_angles_common": "time with both added angles",
+    "added_angles_opposite_share": "added angles of opposite sign",
+    "added_angles_correlation": "correlation of the added angles",
+}
+"""Name without unit -> label, where the rules above give no good one."""
 _PERCENT: Final = DisplayUnit("%", 100.0)
 
 
@@ -114,13 +175,21 @@ def _declare(
     form: Form = Form.NUMBER,
 ) -> list[Metric]:
     """Return metrics of one unit, by their names without it."""
-    found = []
-    for stem in stems:
-        head, _, tail = stem.partition("_")
-        label = " ".join(part for part in (_WORDS.get(head, head), tail.replace("_", " ")) if part)
-        name = f"{stem}_{si}" if si else stem
-        found.append(Metric(name, label, unit or display_unit(f"_{si}"), significance, better, form))
-    return found
+    names = {stem: f"{stem}_{si}" if si else stem for stem in stems}
+    shown = unit or display_unit(f"_{si}")
+    return [Metric(name, _label(stem), shown, significance, better, form) for stem, name in names.items()]
+
+
+def _label(stem: str) -> str:
+    """Return the words for the name of a metric without its unit."""
+    if stem in _LABELS:
+        return _LABELS[stem]
+    for end, label in _ENDS.items():
+        if stem.endswith(end):
+            quantity = stem.removesuffix(end)
+            return label.format(_QUANTITIES.get(quantity, quantity.replace("_", " ")))
+    head, _, tail = stem.partition("_")
+    return " ".join((_QUANTITIES["ay"] if head == "ay" else head, *tail.split("_")))
 
 
 _SMALLER, _LOWER, _HIGHER = Better.SMALLER, Better.LOWER, Better.HIGHER

@@ -73,7 +73,7 @@ def test_info_tells_what_a_recording_holds(call, file):
         "controller: ars",
         "road.mu 0.7",
         f"activesteer {__version__}",
-        "lateral acceleration peak abs",
+        "largest lateral acceleration",
         "mjcf/compact/compact.xml",
     ):
         assert text in printed

@@ -30,7 +30,7 @@ def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
     assert files == ["step_steer-afs.mcap", "step_steer-ars.mcap", "step_steer-none.mcap"]
     lines = told.out.splitlines()
     assert lines[0].split() == ["none", "ars", "afs"]
-    (peak,) = (line for line in lines if line.startswith("yaw rate peak  "))
+    (peak,) = (line for line in lines if line.startswith("peak yaw rate  "))
     shown = [float(number) for number in peak.split()[-3:]]
     for name, value in zip(("none", "ars", "afs"), shown, strict=True):
         metrics = Recording.open(tmp_path / "out" / f"step_steer-{name}.mcap").metrics

@@ -61,7 +61,7 @@ def test_controller_that_fails_leaves_the_table_to_the_others(call: Call, contro
     short = ("--set", "settle_s=0", "--set", "duration_s=2.2", "--set", "steer.start_s=0.05")
     told = call("run", "step_steer", "-c", given, "-c", "none", *short, "-o", "runs")
     assert told.status == 1
-    assert "yaw rate steady state" in told.out
+    assert "steady-state yaw rate" in told.out
     assert "Mine.step raised ValueError: no" in told.err
     failed, other = call("run", "step_steer", "-c", given, "-c", "none", *short, "-o", "runs", "--json").json["runs"]
     assert "metrics" not in failed

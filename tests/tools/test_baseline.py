@@ -44,7 +44,7 @@ def test_a_count_has_no_tolerance():
 
 def test_a_drift_is_told_in_display_units():
     [drift] = drifts(driven(sideslip_peak_abs_rad=math.radians(90.0)), driven())
-    assert "sideslip peak abs 114.592 -> 90.000 (tolerance 1.15 deg)" in str(drift)
+    assert "largest sideslip angle 114.592 -> 90.000 (tolerance 1.15 deg)" in str(drift)
 
 
 @pytest.mark.parametrize("value", [math.nan, 1.0])

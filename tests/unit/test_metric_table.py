@@ -15,17 +15,17 @@ from tests.raising import raises
 @pytest.mark.parametrize(
     ("name", "label", "unit", "shown_for_one"),
     [
-        ("yaw_rate_peak_radps", "yaw rate peak", "deg/s", 180.0 / math.pi),
-        ("roll_peak_rad", "roll peak", "deg", 180.0 / math.pi),
+        ("yaw_rate_peak_radps", "peak yaw rate", "deg/s", 180.0 / math.pi),
+        ("roll_peak_rad", "peak roll angle", "deg", 180.0 / math.pi),
         ("tb_srad", "TB factor", "s deg", 180.0 / math.pi),
-        ("ay_steady_state_mps2", "lateral acceleration steady state", "m/s²", 1.0),
-        ("speed_end_mps", "speed end", "km/h", 3.6),
+        ("ay_steady_state_mps2", "steady-state lateral acceleration", "m/s²", 1.0),
+        ("speed_end_mps", "final speed", "km/h", 3.6),
         ("yaw_rate_response_time_s", "yaw rate response time", "s", 1.0),
         ("ay_overshoot", "lateral acceleration overshoot", "%", 100.0),
-        ("friction_utilisation_max", "friction utilisation max", "-", 1.0),
-        ("yaw_rate_after_1000ms_share", "yaw rate after 1000ms share", "%", 100.0),
+        ("friction_utilisation_max", "largest friction utilisation", "-", 1.0),
+        ("yaw_rate_after_1000ms_share", "yaw rate remaining after 1.00 s", "%", 100.0),
         ("lane_overstep_m", "lane overstep", "m", 1.0),
-        ("steering_wheel_rate_rms_radps", "steering wheel rate rms", "deg/s", 180.0 / math.pi),
+        ("steering_wheel_rate_rms_radps", "steering wheel rate, RMS", "deg/s", 180.0 / math.pi),
     ],
 )
 def test_a_metric_has_words_and_a_unit_for_display(name, label, unit, shown_for_one):

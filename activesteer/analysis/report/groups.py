@@ -125,7 +125,7 @@ def outcome(recording: Recording) -> str:
     for name in (*peaks[:1], *_ALSO):
         if name in metrics:
             shown = metric(name)
-            said.append(f"{shown.label.removesuffix(' abs')} {shown.text(metrics[name])} {shown.unit.name}")
+            said.append(f"{shown.label} {shown.text(metrics[name])} {shown.unit.name}")
     return ", ".join(said)
 
 

@@ -110,7 +110,7 @@ def test_runs_are_grouped_by_manoeuvre_in_the_papers_order(page):
 def test_metrics_are_told_with_their_difference_to_the_first_run(page):
     words = Page(page).words
     # 0.25, 0.2 and 0.22 rad/s
-    assert "yaw rate peak deg/s 14.32 11.46 -2.865 (-20 %) 12.61 -1.719 (-12 %)" in words
+    assert "peak yaw rate deg/s 14.32 11.46 -2.865 (-20 %) 12.61 -1.719 (-12 %)" in words
 
 
 def told(group: Group) -> dict[str, dict[str, Any]]:
@@ -344,7 +344,7 @@ def test_what_is_not_finite_is_left_out():
     values = data_of(page)[0]["panels"][1]["series"][0]["values"]
     assert values[600] is not None
     assert set(values[601:]) == {None}
-    assert "yaw rate peak deg/s -" in Page(page).words
+    assert "peak yaw rate deg/s -" in Page(page).words
 
 
 def test_runs_of_different_length_and_step_share_their_time():
@@ -452,10 +452,10 @@ def run(**metrics: float) -> Recording:
 
 def test_lanes_cones_and_sideslip_are_said_with_their_sizes():
     good = run(stays_in_lanes=1.0, lane_overstep_m=-0.2, cones_hit=0.0, sideslip_peak_abs_rad=math.radians(1.5))
-    assert outcome(good) == "stays in the lanes, hits no cone, sideslip peak 1.500 deg"
+    assert outcome(good) == "stays in the lanes, hits no cone, largest sideslip angle 1.500 deg"
     bad = run(stays_in_lanes=0.0, lane_overstep_m=0.5, cones_hit=1.0, sideslip_peak_abs_rad=math.radians(50.0))
     assert outcome(bad) == (
-        "lost: 50 deg of peak sideslip, leaves the lane by 0.50 m, hits 1 cone, sideslip peak 50.000 deg"
+        "lost: 50 deg of peak sideslip, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
     )
 
 

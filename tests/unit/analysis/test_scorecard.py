@@ -70,8 +70,8 @@ def test_text_shows_the_numbers_of_the_systems_beside_each_other_in_display_unit
     values = {"none_yaw_rate_peak_radps": math.radians(12.0), "ars_yaw_rate_peak_radps": math.nan}
     text = scorecard([claim("S1", True, **values, track_difference_none_ars_m=0.25)], known={}).to_text()
     lines = [line.strip() for line in text.splitlines()]
-    assert "yaw rate peak: none 12  ars - deg/s" in lines
-    assert "track difference none ars: 0.25 m" in lines
+    assert "peak yaw rate: none 12  ars - deg/s" in lines
+    assert "track difference, none and ars: 0.25 m" in lines
     assert lines[-1] == "1 claims: 1 passed"
 
 

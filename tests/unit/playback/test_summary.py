@@ -17,7 +17,7 @@ def test_scenario_systems_and_metrics_side_by_side() -> None:
     assert text.count("A circle") == 1
     assert "- **1 no control**: controller none, vehicle compact, activesteer ?, road.mu = 0.4" in lines
     assert "| metric | none | ars |" in lines
-    assert "| yaw rate peak [deg/s] | 11.459 | 11.459 |" in lines
+    assert "| peak yaw rate [deg/s] | 11.459 | 11.459 |" in lines
     assert "| lag_s | - | - |" in lines  # not defined
     assert "| only_here_s |  | 1.500 |" in lines
 

@@ -44,7 +44,7 @@ def test_the_command_writes_a_file(file: Path, tmp_path: Path, capsys: pytest.Ca
     rrd = Rrd(out)
     assert "/ars/scene/car/chassis" in rrd.entities
     # Metrics are shown in the units of the tables.
-    assert "| yaw rate peak [deg/s] | 11.459 |" in rrd.column("/summary", "TextDocument:text")[0][0]
+    assert "| peak yaw rate [deg/s] | 11.459 |" in rrd.column("/summary", "TextDocument:text")[0][0]
 
 
 def test_the_viewer_says_nothing_of_its_own(tmp_path: Path) -> None:

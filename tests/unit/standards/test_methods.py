@@ -166,7 +166,7 @@ def test_transition_through_friction():
 
 def test_a_table_of_metrics_has_an_empty_cell_where_there_is_none():
     table = metrics_table("t", {"a": {"yaw_rate_peak_radps": math.radians(2.0)}, "b": {"track_amplitude_m": 1.0}})
-    assert table.rows == [["yaw rate peak", "deg/s", "2.000", "-"], ["track amplitude", "m", "-", "1.000"]]
+    assert table.rows == [["peak yaw rate", "deg/s", "2.000", "-"], ["track amplitude", "m", "-", "1.000"]]
 
 
 def test_the_compact_stops_from_100_kmh():

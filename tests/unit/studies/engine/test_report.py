@@ -278,7 +278,7 @@ def test_a_metric_is_drawn_over_each_factor_by_value_or_by_level(page, tmp_path)
     pictures, _ = drawn(data, tmp_path)
     words, speed = pictures["scatter"]["panels"]
     assert (words["x"], words["x_levels"]) == ("a factor of words", ["0.8", "0.9", "1"])
-    assert (speed["x"], speed["x_levels"], speed["y"]) == ("speed [km/h]", None, "yaw rate peak [deg/s]")
+    assert (speed["x"], speed["x_levels"], speed["y"]) == ("speed [km/h]", None, "peak yaw rate [deg/s]")
     none = [row for row in rows if row["controller"] == "none"]
     points = zip(speed["curves"][0]["x"], speed["curves"][0]["y"], speed["curves"][0]["told"], strict=True)
     for row, (speed_kmh, peak_degps, told) in zip(none, points, strict=True):
@@ -289,7 +289,7 @@ def test_a_metric_is_drawn_over_each_factor_by_value_or_by_level(page, tmp_path)
     assert [round(curve["x"][0] - words["curves"][0]["x"][0], 2) for curve in words["curves"]] == [0.0, 0.16, 0.32]
     parallel = pictures["parallel"]["panels"]
     assert [panel["title"] for panel in parallel] == data["controllers"]
-    assert parallel[0]["names"][-1].partition(":")[0] == "yaw rate peak [deg/s]"
+    assert parallel[0]["names"][-1].partition(":")[0] == "peak yaw rate [deg/s]"
     # A line enters the strip of an axis where it leaves it, with no room between the strip and the line.
     panel, line = parallel[0], parallel[0]["curves"][0]
     assert panel["y_range"][0] == panel["areas"][0]["low"][0]
