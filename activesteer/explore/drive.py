@@ -139,9 +139,11 @@ class DriveSession:
         self._course = course = COURSES[choice.maneuver]
         self._speed_kmh = course.speed_kmh if choice.speed_kmh is None else choice.speed_kmh
         self._mu = course.mu if choice.mu is None else choice.mu
-        overrides = {"speed_kmh": self._speed_kmh, "duration_s": _LONGEST_S, "road.mu": self._mu}
-        scenario = resolve(course.maneuver, folder.located(choice.vehicle), overrides, self._take)
-        scenario = replace(scenario, maneuver=replace(scenario.maneuver, title=f"{course.title}, driven by hand"))
+        chosen = {"speed_kmh": self._speed_kmh, "road.mu": self._mu}
+        longest = chosen | {"duration_s": _LONGEST_S}
+        scenario = resolve(course.maneuver, folder.located(choice.vehicle), longest, self._take)
+        by_hand = replace(scenario.maneuver, title=f"{course.title}, driven by hand")
+        scenario = replace(scenario, maneuver=by_hand, overrides=chosen)
         self._simulation = Simulation(scenario, folder.located(choice.controllers[0]))
         self._simulation.context.metadata["driver"]["name"] = "by hand"
         self._names = {"controller": choice.controllers[0]}
@@ -191,8 +193,8 @@ class DriveSession:
         """Carry out a message of the page: hands, controller, speed to hold, friction."""
         if message.controller:
             self._folder.check_name("controller", message.controller)
-            loop, name = self._simulation.loop, self._folder.located(message.controller)
-            loop.replace_controller(name)
+            self._simulation.loop.replace_controller(self._folder.located(message.controller))
+            self._simulation.note(f"controller = {message.controller}")
             self._names["controller"] = message.controller
         if message.speed_kmh is not UNSET:
             self._driver.hold_mps = None if message.speed_kmh is None else message.speed_kmh / 3.6
@@ -296,6 +298,17 @@ class DriveSession:
         self._missed |= bool(((passed_y_m - path_y_m) * (passed_y_m - y_m) <= 0.0).any())
         self._front_x_m = x_m
 
+    def _result(self) -> str:
+        """Describe the time of the last lap or of the gates, with the cones, or return an empty text."""
+        hit = int(np.sum(~self._standing))
+        cones = f"{hit} cone{'s' * (hit != 1)} hit (+{hit * _CONE_S:g} s)" if hit else ""
+        if self._missed:
+            return ", ".join(filter(None, ("no time: a gate was missed", cones)))
+        if self._last_lap_s is None:
+            return cones
+        word = "last lap" if self._course.radius_m else "time"
+        return ", ".join(filter(None, (f"{word} {self._last_lap_s + hit * _CONE_S:.2f} s", cones)))
+
     def end(self) -> Reply:
         """Complete the recording of a drive."""
         simulation = self._simulation
@@ -303,10 +316,11 @@ class DriveSession:
         problem = ""
         try:
             with self._files:
-                recording = simulation.recording()
-                recording.metadata["complete"] = True  # a drive is as long as its driver wants
-                recording.metadata.pop("error", None)
-                simulation.end_file(recording)
+                # A drive is as long as its driver wants.
+                simulation.loop.end()
+                if result := self._result():
+                    simulation.note(result)
+                simulation.end_file(simulation.recording())
         except ActiveSteerError as error:
             problem = str(error)
         return Reply(

@@ -136,7 +136,7 @@ class ClosedLoop(Uncopyable):
             SimulationDiverged: the car does not settle.
         """
         self.scenario, self._plugin, self.sequence = scenario, controller_spec(controller), None
-        self._start, self.changes = scenario, ()
+        self._start, self.changes, self._ended = scenario, (), False
         self._inputs = scenario.digest, self._plugin.name, timestep_s, __version__
         self._maneuver = maneuver = scenario.maneuver
         self.vehicle = vehicle = scenario.car.on(maneuver.ground, timestep_s)
@@ -283,8 +283,12 @@ class ClosedLoop(Uncopyable):
 
     @property
     def steps(self) -> int:
-        """Number of steps of the manoeuvre."""
-        return round(self.maneuver.duration_s / self.vehicle.timestep_s)
+        """Number of steps of the manoeuvre, or up to `end`."""
+        return self.step_count if self._ended else round(self.maneuver.duration_s / self.vehicle.timestep_s)
+
+    def end(self) -> None:
+        """End the run at the current step, before the end of the manoeuvre."""
+        self._ended = True
 
     def fail(self, faults: Sequence[Fault], *, more: bool = False) -> None:
         """Replace the faults by others, with their own times.
@@ -425,6 +429,7 @@ class ClosedLoop(Uncopyable):
             raise ParameterError(f"is {shown(state)}; a state of this loop is needed", key="state", value=state)
         if state.inputs != self._inputs:
             raise ParameterError("was saved by a simulation with other inputs", key="state")
+        self._ended = False
         if state.changes != self.changes:
             scenario = self._start
             for key, value, time_s in state.changes:

@@ -13,10 +13,11 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from activesteer.config import Range
 from activesteer.config.faults import Fault
 from activesteer.controllers import CONTROLLER, controller_spec
 from activesteer.core.conventions import DEFAULT_TIMESTEP_S
-from activesteer.core.limits import MAX_EVENTS
+from activesteer.core.limits import MAX_EVENT_LETTERS, MAX_EVENTS
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement, Motion, Setpoint
 from activesteer.driver import DRIVER
 from activesteer.errors import ManeuverError, ParameterError, RecordingError, shown
@@ -318,6 +319,19 @@ class Simulation(Copyable):
         with self.loop.in_use:
             self._check_going_on()
             self._note("fail", self.loop.add_fault(fault))
+
+    def note(self, what: str) -> None:
+        """Record a remark as an event at the current time.
+
+        Raises:
+            ParameterError: the remark is empty or too long.
+            ManeuverError: the simulation is being driven.
+        """
+        if not 0 < len(what) <= MAX_EVENT_LETTERS:
+            raise ParameterError(f"has {len(what)} letters", key="what", allowed=Range(1, MAX_EVENT_LETTERS))
+        with self.loop.in_use:
+            self._check_going_on()
+            self._note("note", what)
 
     def _note(self, kind: str, what: str, time_s: float | None = None) -> None:
         if len(self.events) >= MAX_EVENTS:

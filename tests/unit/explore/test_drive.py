@@ -43,6 +43,12 @@ def go(car: DriveSession, until_s: float) -> dict[str, Any]:
             return header
 
 
+def result_of(car: DriveSession) -> str:
+    """Return the last event of a finished drive."""
+    assert car.path is not None
+    return activesteer.Recording.open(car.path).metadata["events"][-1]["what"]
+
+
 def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_path: Path) -> None:
     car = drive("plane", tmp_path)
     assert next(car.start()).header["cones"] == []
@@ -60,6 +66,10 @@ def test_steering_to_the_left_turns_left_and_the_recording_holds_the_drive(tmp_p
     assert recording.metadata["complete"]  # a drive is as long as its driver wants
     assert recording.metadata["maneuver"]["title"] == "Free plane, dry, driven by hand"
     assert recording.metadata["driver"]["name"] == "by hand"
+    assert recording.metadata["overrides"].keys() == {"speed_kmh", "road.mu"}
+    (change,) = recording.metadata["events"]
+    assert (change["time_s"], change["what"]) == (pytest.approx(1.5, abs=0.1), "controller = ars")
+    assert recording.metrics["speed_end_mps"] == pytest.approx(recording["vx_mps"][-1], rel=0.01)
 
 
 def test_the_gauges_of_a_car_that_spins_are_those_of_its_recording(tmp_path: Path) -> None:
@@ -175,6 +185,7 @@ def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:
     assert header["missed"]
     assert header["last_lap_s"] is None
     car.end()
+    assert result_of(car).startswith("no time: a gate was missed")
 
 
 def test_a_drive_through_all_gates_has_a_time(tmp_path: Path) -> None:
@@ -190,6 +201,7 @@ def test_a_drive_through_all_gates_has_a_time(tmp_path: Path) -> None:
         car.act(Act(steer=max(-1.0, min(1.0, 1.5 * aside_rad))))
     assert header["last_lap_s"] > 10.0
     car.end()
+    assert result_of(car).startswith(f"time {header['last_lap_s']:.2f} s")
 
 
 def test_an_unknown_controller_or_one_of_another_folder_is_refused_and_the_drive_goes_on(tmp_path: Path) -> None:

@@ -52,6 +52,17 @@ def test_friction_changes_from_the_next_step_on_and_is_an_event_of_the_file(tmp_
     assert events_of(again.metadata) == [(0.5, "set", "road.mu = 0.3")] == list(simulation.events)
 
 
+def test_a_remark_is_an_event_at_the_current_time() -> None:
+    simulation = Simulation("straight_line", overrides={"duration_s": 0.2})
+    simulation.advance(100)
+    simulation.note("brakes are hot")
+    for wrong in ("", "a" * 2001):
+        with raises(ParameterError, key="what"):
+            simulation.note(wrong)
+    simulation.run()
+    assert events_of(simulation.recording().metadata) == [(0.1, "note", "brakes are hot")]
+
+
 @pytest.mark.parametrize(
     ("controller", "key"), [("ars", "ars.limit_deg"), ("lqr", "servos.lag_s"), (Follows, "Follows.gain_s")]
 )
