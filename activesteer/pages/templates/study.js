@@ -38,12 +38,13 @@ const placeOf = (factor, value) => (value == null || factor.numeric ? value : fa
 // The factors that vary in some rows; others belong to other manoeuvres.
 const varied = (rows) => DATA.factors.filter(({ key }) => rows.some((i) => DATA.rows.factors[key][i] != null));
 
-// Points of controllers stand side by side where the levels of a factor would put them on one line.
-function scatter(factor, label, rows, valueOf) {
+// Points of controllers stand side by side where the levels of a factor would put them on one line. Few runs over one factor are joined.
+function scatter(factor, label, rows, valueOf, joined = false) {
   const beside = (c) => (factor.numeric ? 0 : APART * (c - (DATA.controllers.length - 1) / 2));
   const curves = DATA.controllers.map((_, c) => {
     const own = rows.filter((i) => DATA.rows.controller[i] === c && valueOf(i) != null && DATA.rows.factors[factor.key][i] != null);
-    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i]) + beside(c)), own.map(valueOf), { alpha: 0.6, told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
+    if (joined) own.sort((i, k) => DATA.rows.factors[factor.key][i] - DATA.rows.factors[factor.key][k]);
+    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i]) + beside(c)), own.map(valueOf), { ...(joined ? { dashes: [], width: 1.5, size: 7 } : { alpha: 0.6 }), told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
   });
   return panelOf(axisOf(factor), label, { title: factor.label, curves: curves.filter((curve) => curve.x.length), x_levels: factor.numeric ? null : factor.levels });
 }
@@ -170,21 +171,22 @@ function drawAll() {
 function drawGroup() {
   const group = Number(chosenGroup.value), metric = DATA.metrics.find((each) => each.name === chosenMetric.value);
   const found = DATA.by_group[group][metric.name];
-  begin("Distribution", found ? "" : "No run of this manoeuvre has this metric.");
+  begin(found?.few ? "Range" : "Distribution", found ? "" : "No run of this manoeuvre has this metric.");
   if (!found) return;
   const rows = [...DATA.rows.group.keys()].filter((i) => DATA.rows.group[i] === group), values = DATA.rows.metrics[metric.name];
-  const quantiles = ["5 %", "median", "95 %"].map((text) => withUnit(text, metric.unit)), first = DATA.controllers[0];
+  const { few } = found, factors = varied(rows), joined = few && factors.length === 1 && factors[0].numeric;
+  const quantiles = (few ? ["least", "median", "largest"] : ["5 %", "median", "95 %"]).map((text) => withUnit(text, metric.unit)), first = DATA.controllers[0];
   tableOf(["controller", ...quantiles], DATA.controllers.map((name, c) => [name, ...(found.quantiles[c] || [null, null, null]).map(number)]));
-  show("distribution", [histogram(metric, found.histogram)]);
+  if (!few) show("distribution", [histogram(metric, found.histogram)]);
   begin("Metric over factors", DATA.all > DATA.rows.run.length ? `Points are ${DATA.rows.run.length} of ${DATA.all} runs; everything else uses all runs.` : "");
-  show("scatter", varied(rows).map((factor) => scatter(factor, axisOf(metric), rows, (i) => values[i])));
+  show("scatter", factors.map((factor) => scatter(factor, axisOf(metric), rows, (i) => values[i], joined)));
   if (found.paired.some((pair) => pair)) {
     const base = new Map(rows.filter((i) => DATA.rows.controller[i] === 0).map((i) => [DATA.rows.sample[i], values[i]]));
     const pairs = rows.filter((i) => DATA.rows.controller[i] > 0 && values[i] != null && base.get(DATA.rows.sample[i]) != null);
     begin(`Difference from ${first}`, "Both drive the same sample.");
     tableOf([`difference from ${first}`, ...quantiles, "smaller in magnitude [%]"],
       found.paired.map((pair, n) => [DATA.controllers[n + 1], ...(pair ? [...pair.quantiles.map(number), short(100 * pair.smaller)] : ["-", "-", "-", "-"])]));
-    show("paired", varied(pairs).map((factor) => scatter(factor, `difference: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]))));
+    show("paired", varied(pairs).map((factor) => scatter(factor, `difference: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]), joined)));
   }
   const map = found.heat || binned(rows, values);
   if (map) { begin("Mean over two factors"); heat(metric, map); }
@@ -192,8 +194,7 @@ function drawGroup() {
     begin("Sensitivity", "Points are indices, lines their 95 % confidence. S1: share of the variance due to the factor alone; ST: share with all its interactions; mu*: mean magnitude of the change over the whole range of the factor, in the unit of the metric.");
     sensitivity(metric, found.indices);
   }
-  begin("Parallel coordinates");
-  parallel(metric, rows);
+  if (!few) { begin("Parallel coordinates"); parallel(metric, rows); }
   begin("Largest and smallest magnitudes");
   tableOf(["controller", "run", axisOf(metric), "command to drive and replay it"],
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])), true);
@@ -205,7 +206,10 @@ function drawGroup() {
     if (other.name === "claims_failed") continue; // the claims themselves follow
     if (claim && constantIn(...endsOf(known))) constant.push(`claim ${claim[1]} ${known[0] ? "reproduced" : "not reproduced"}`);
     else if (constantIn(...endsOf(known))) constant.push(`${other.label} ${known.length ? short(known[0]) : "-"} ${other.unit === "-" ? "" : other.unit}`.trim());
-    else others.push({ ...histogram(other, DATA.by_group[group][other.name].histogram), title: other.label, name: other.name });
+    else {
+      const panel = few && factors.length ? scatter(factors[0], other.unit === "-" ? "" : other.unit, rows, (i) => DATA.rows.metrics[other.name][i], joined) : histogram(other, DATA.by_group[group][other.name].histogram);
+      others.push({ ...panel, title: other.label, name: other.name });
+    }
   }
   begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   others.sort((a, b) => firstPlace(a.name) - firstPlace(b.name));

@@ -32,6 +32,8 @@ from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 
 _SHOWN_ROWS: Final = 3000
 """Most runs whose points the page holds. Counts and means are over all runs."""
+_FEW: Final = 20
+"""Runs of a controller below which quantiles, ranks and shares say little: the page shows each run instead."""
 _BINS: Final = 40
 _EXTREMES: Final = 5
 _FIRST: Final = (*SIDESLIP_PEAKS, "yaw_rate_peak_radps", "ay_peak_mps2")
@@ -95,6 +97,8 @@ def _finding(data: Mapping[str, Any]) -> list[Text]:
     for place, controller in enumerate(data["controllers"] if name else ()):
         own = (np.array(rows["group"]) == 0) & (np.array(rows["controller"]) == place)
         columns = {each["label"]: rows["factors"][each["key"]] for each in data["factors"] if each["numeric"]}
+        if len(columns) < 2 or np.sum(own) < _FEW:
+            continue
         pairs = ((label, np.array([x, rows["metrics"][name]], np.float64)) for label, x in columns.items())
         found = [(_correlation(*pair[:, own & np.isfinite(pair).all(axis=0)]), label) for label, pair in pairs]
         value, most = max(found, key=lambda pair: abs(pair[0]), default=(0.0, ""))
@@ -206,6 +210,8 @@ def _of_group(
         for each in (rows[1:] if study.design.paired else ())
     ]
     factor_values = FactorValues(study)
+    few = max(map(len, rows)) < _FEW
+    shares = (0.0, 0.5, 1.0) if few else (0.05, 0.5, 0.95)
     found = {}
     for name, column in values.items():
         parts = [column[each] for each in rows]
@@ -214,8 +220,9 @@ def _of_group(
             continue
         found[name] = {
             "histogram": _histogram(finite),
-            "quantiles": [_json(np.quantile(part, [0.05, 0.5, 0.95])) if len(part) else None for part in finite],
-            "paired": _paired(pairs, parts),
+            "few": few,
+            "quantiles": [_json(np.quantile(part, shares)) if len(part) else None for part in finite],
+            "paired": _paired(pairs, parts, shares),
             "heat": _heat(study, table, rows, parts),
             "indices": _indices(study, points, parts) if indexed else [],
             "extremes": [_extremes(factor_values, driven, each, part) for each, part in zip(rows, parts, strict=True)],
@@ -233,8 +240,10 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
     return {"edges": _json(edges), "counts": [np.histogram(part, edges)[0].tolist() for part in parts]}
 
 
-def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> list[Any]:
-    """Return the 5, 50 and 95 % quantiles of the differences from the first controller in the same sample.
+def _paired(
+    pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array], shares: tuple[float, float, float]
+) -> list[Any]:
+    """Return quantiles of the differences from the first controller in the same sample.
 
     `smaller` is the share of the samples in which its value is smaller in magnitude.
     """
@@ -247,7 +256,7 @@ def _paired(pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array]) -> l
             continue
         difference = (b - a)[both]
         smaller = float(np.mean(np.abs(b[both]) < np.abs(a[both])))
-        found.append({"quantiles": _json(np.quantile(difference, [0.05, 0.5, 0.95])), "smaller": round(smaller, 4)})
+        found.append({"quantiles": _json(np.quantile(difference, shares)), "smaller": round(smaller, 4)})
     return found
 
 

@@ -358,7 +358,7 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
 
 _LEAST_SHARE: Final = 0.005
 """Participation below it is left out."""
-_MODE_COLUMNS: Final = ("mode", "f [Hz]", "damping", "eigenvalue [1/s]", "participation")
+_MODE_COLUMNS: Final = ("mode", "natural frequency [Hz]", "damping ratio", "eigenvalue [1/s]", "participation")
 
 
 def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, ...]]:
@@ -369,7 +369,8 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
         largest = list(mode.participation.items())[:3]
         parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in largest if fraction >= _LEAST_SHARE)
-        yield mode.name, f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}", value, parts
+        swings = (f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}") if s.imag else ("-", "-")
+        yield mode.name, *swings, value, parts
 
 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
@@ -397,10 +398,11 @@ def _conclusion(modes: Sequence[Mode]) -> list[Text]:
     return [
         failed(f"unstable: {growing}") if growing else passed("stable: every mode decays"),
         *(
-            f"{words} at {mode.natural_frequency_Hz:.2f} Hz with a damping ratio of {mode.damping_ratio:.2f}."
+            f"{words} with a natural frequency of {mode.natural_frequency_Hz:.2f} Hz and a damping ratio of "
+            f"{mode.damping_ratio:.2f}."
             for mode, words in (
                 *((mode, f"The least damped mode is {mode.name},") for mode in swinging[:1]),
-                *((mode, "Yaw and sideslip swing") for mode in steered[:1]),
+                *((mode, "Yaw and sideslip oscillate") for mode in steered[:1]),
             )
         ),
     ]
@@ -457,7 +459,7 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
     for named, speed_mps in zip(found, speeds_mps, strict=True):
         poles = np.array([pole for _, pole in named], dtype=np.complex128)
         shade = (3.6 * speed_mps - slowest) / max(fastest - slowest, 1e-9)
-        curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=3.5, shade=shade))
+        curves.append(Curve(poles.real, poles.imag, dashes="", marker="o", size=5.0, shade=shade))
     panel = Panel(
         "real part [1/s]",
         "imaginary part [1/s]",

@@ -13,7 +13,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from scipy.stats import rankdata
 
 from activesteer import study
 from activesteer.commands.cli import main
@@ -113,7 +112,9 @@ def test_the_page_holds_what_the_rows_say(page):
     peaks = {(row["controller"], row[RATIO], row["speed_kmh"]): row["yaw_rate_peak_radps"] for row in rows}
     degps = {key: np.degrees(value) for key, value in peaks.items() if value is not None}
     none = [value for key, value in degps.items() if key[0] == "none"]
-    assert found["quantiles"][0][1] == pytest.approx(np.median(none), rel=1e-4)
+    # Six runs have no 5 % quantile.
+    assert found["few"]
+    assert found["quantiles"][0] == pytest.approx([min(none), np.median(none), max(none)], rel=1e-4)
     differences = [degps["ars", *key[1:]] - value for key, value in degps.items() if key[0] == "none"]
     assert found["paired"][0]["quantiles"][1] == pytest.approx(np.median(differences), rel=1e-3, abs=1e-4)
     assert found["heat"]["maps"][0][1][0] == pytest.approx(degps["none", 0.9, 70.0], rel=1e-4)
@@ -186,8 +187,8 @@ def test_a_study_without_rows_has_no_page(tmp_path):
         write_report(tmp_path)
 
 
-def test_the_head_says_what_was_driven_and_on_which_factor_the_first_metric_depends_most(page):
-    text, data, rows = page
+def test_the_head_says_what_was_driven(page):
+    text, data, _ = page
     head = text.partition('id="study"')[0]
     maneuver, vehicle = data["groups"][0].split(", ")
     told = f"Manoeuvres: {maneuver}. Vehicles: {vehicle}. Controllers: {', '.join(data['controllers'])}."
@@ -197,25 +198,26 @@ def test_the_head_says_what_was_driven_and_on_which_factor_the_first_metric_depe
         "speed_kmh": "70 to 80",
     }
     assert text.index("70 to 80") < text.index('class="drawn"')
-    name = next(name for name in data["first"] if name in data["by_group"][0])
-    peaks = [(row["speed_kmh"], row[RATIO], row[name]) for row in rows if row["controller"] == "none"]
-    speed, ratio, peak = (np.array(column) for column in zip(*peaks, strict=True))
-    on_speed, on_ratio = (abs(np.corrcoef(rankdata(factor), rankdata(peak))[0, 1]) for factor in (speed, ratio))
-    assert on_speed > on_ratio
-    assert f"speed with none ({on_speed:.2f})" in head
+    assert "depends most" not in head  # six runs of a controller are too few for a rank
 
 
-def test_the_head_says_whether_a_metric_falls_with_its_factor():
+@pytest.mark.parametrize("runs", [16, 20])
+def test_the_head_names_the_factor_that_a_metric_falls_with_if_the_runs_are_many(runs):
     """A greater gain gives less sideslip; the ratio hardly matters."""
     factors = [{"key": key, "label": key, "numeric": True} for key in ("ratio", "gain")]
+    several = runs // 4
     rows = {
-        "group": [0] * 4, "controller": [0] * 4, "metrics": {"sideslip_peak_abs_rad": [4.0, 3.0, 1.0, 2.0]},
-        "factors": {"ratio": [1.0, 2.0, 2.0, 1.0], "gain": [0.1, 0.2, 0.4, 0.3]},
+        "group": [0] * runs, "controller": [0] * runs,
+        "metrics": {"sideslip_peak_abs_rad": [4.0, 3.0, 1.0, 2.0] * several},
+        "factors": {"ratio": [1.0, 2.0, 2.0, 1.0] * several, "gain": [0.1, 0.2, 0.4, 0.3] * several},
     }  # fmt: skip
     data = {
         "rows": rows, "factors": factors, "controllers": ["ars"], "groups": ["slalom"],
         "by_group": [{"sideslip_peak_abs_rad": {}}],
     }  # fmt: skip
+    if runs < 20:
+        assert _finding(data) == []
+        return
     (words,) = _finding(data)
     assert "gain with ars (\N{MINUS SIGN}1.00)" in str(words)
 
@@ -275,6 +277,9 @@ def drawn(data, folder, metric="yaw_rate_peak_radps"):
 def test_a_metric_is_drawn_over_each_factor_by_value_or_by_level(page, tmp_path):
     data, rows = copy.deepcopy(page[1]), page[2]
     data["factors"][0] |= {"numeric": False, "levels": ["0.8", "0.9", "1"], "label": "a factor of words"}
+    assert not {"parallel", "distribution"} & drawn(data, tmp_path)[0].keys()  # of few runs
+    for found in data["by_group"][0].values():
+        found["few"] = False
     pictures, _ = drawn(data, tmp_path)
     words, speed = pictures["scatter"]["panels"]
     assert (words["x"], words["x_levels"]) == ("a factor of words", ["0.8", "0.9", "1"])
