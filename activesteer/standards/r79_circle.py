@@ -102,7 +102,7 @@ def examine(runner: StandardRunner) -> Findings:
         "rim_radius_m": RIM_RADIUS_M, "efforts": efforts, "faults": faults,
         "pass": all(row["pass"] for row in efforts),
     }  # fmt: skip
-    summary = f"{_effort_words(efforts)}; circle (no limits): {_fault_words(faults)}"
+    summary = f"{_effort_words(efforts)}. Faults on a circle are not judged: {_fault_words(faults)}"
     force = {f"{name.replace('_', ' ')}, {side}": run for name, runs in spirals.items() for side, run in runs.items()}
     pictures = [
         Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the beginning of steer")),

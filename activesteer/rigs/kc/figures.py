@@ -81,7 +81,12 @@ def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
 def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:
     met = len(result.targeted) - len(result.outside)
     lead: list[Text] = [f"{met} of {len(result.targeted)} target bands are met."] if result.targeted else []
-    lead += [failed(f"outside: {_row_name(entry)}") for entry in result.outside]
+    lead += [
+        f"Outside its band: {_row_name(entry)}; {entry.remark}."
+        if entry.remark
+        else failed(f"outside: {_row_name(entry)}")
+        for entry in result.outside
+    ]
     heads = ["axle", "metric", "value", "unit"]
     banded = sorted(result.targeted, key=lambda entry: entry.inside is True)  # those outside first
     others = [_metric_row(entry)[:4] for entry in result.metrics if entry.inside is None]
