@@ -29,7 +29,7 @@ _PIECE_BYTES: Final = 1 << 20
 
 
 class ChildFault(Exception):  # noqa: N818 - a fault of the child
-    """A child process crashed, hung or returned invalid data. The message gives the reason."""
+    """Failure of a child process: it crashed, hung or returned invalid data. The message gives the reason."""
 
 
 class Child:

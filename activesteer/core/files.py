@@ -74,7 +74,7 @@ def delete_temporary_files() -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a UTF-8 text file, and replace an existing one."""
+    """Write a UTF-8 text file, which replaces an existing one, and return its path."""
     with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)

@@ -126,7 +126,7 @@ def nested_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
 
 
 def numbers_in(message: tuple[Any, ...]) -> list[float]:
-    """Return all numbers of a message as a flat tuple (see `numbers_of`)."""
+    """Return all numbers of a message as a flat list (see `numbers_of`)."""
     row: list[float] = []
     for width, value in zip(widths_of(type(message)), message, strict=True):
         if width == 1:

@@ -82,7 +82,7 @@ class Folder:
             raise ParameterError(f"is {shown(name)}, but {self.path} has no file {file}", key=key, value=name)
 
     def located(self, name: str) -> str:
-        """Return a name for the simulation, for a file with its folder."""
+        """Return a name as the simulation takes it, with the folder for a file."""
         return str(self.path / name) if ".toml" in name or ".py:" in name else name
 
 

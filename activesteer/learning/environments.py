@@ -134,7 +134,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 def _first(command: Any) -> Any:
-    """Return the first of several vectorised commands."""
+    """Return the command of the first car of a batch."""
     first = (value[0].tolist() if isinstance(value, np.ndarray) else value for value in command)
     return type(command)(*(tuple(value) if isinstance(value, list) else value for value in first))
 

@@ -159,7 +159,7 @@ class Plugin:
     is_builtin: bool = False
 
     def __post_init__(self) -> None:
-        """Mark in the label that a block uses the true motion, once even for a copy."""
+        """Mark in the label, only once, that a block uses the true motion."""
         if self.uses_truth and not self.label.endswith("+truth"):
             object.__setattr__(self, "label", f"{self.label}+truth")
 

@@ -29,7 +29,7 @@ SIDES: Final = {"left": 1.0, "right": -1.0}
 
 
 class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
-    """A car cannot be tested with a controller, because a prerequisite run failed."""
+    """Failure of a prerequisite run, without which a car cannot be tested."""
 
 
 @dataclass(frozen=True)

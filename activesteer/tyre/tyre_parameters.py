@@ -131,7 +131,7 @@ def _is_finite(record: bytes) -> bool:
 
 @compiled
 def _on_road(tyre, deflection_m, camber_rad, speed_mps, slip, across_mps, closing_mps):
-    """Evaluate the tyre in the way of the engine, without relaxation states."""
+    """Evaluate the tyre as the engine does, without relaxation states."""
     p = tyre[0]
     cos, sin = math.cos(camber_rad), math.sin(camber_rad)
     spin = (1.0 + slip) * speed_mps / p.UNLOADED_RADIUS
@@ -275,7 +275,7 @@ class TyreParameters(Mapping[str, float]):
         return replace(self, given={**self.given, **changes})
 
     def __getitem__(self, key: str) -> float:
-        """Return the value of a key in SI, by default its default value."""
+        """Return the value of a key in SI, from the file or by default."""
         values: Mapping[str, float] = self.__dict__["_values"]
         try:
             return values[key]

@@ -330,7 +330,7 @@ class Vehicle(Uncopyable):
         return self.truth()[1]
 
     def truth(self) -> tuple[Measurement, Motion]:
-        """Return the signals of ideal sensors."""
+        """Return the signals of ideal sensors, and the motion of the car."""
         if not native_step.sense(self._address, *self._sensed_at):
             self.check()
         return self._said()

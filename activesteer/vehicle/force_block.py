@@ -292,7 +292,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return a record from a row of numbers, with 0 for missing numbers."""
+    """Return a record with given values, and 0 for missing numbers."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:

@@ -65,7 +65,7 @@ def _polynomial(coefficients, x):
 
 @inlined
 def _played(link, screw_m, longer_m):
-    """Return the change of a link's length beyond its play."""
+    """Return the change of a link's length, limited to the play about the screw's position."""
     half = 0.5 * link.backlash_m
     return min(max(longer_m, screw_m - half), screw_m + half)
 

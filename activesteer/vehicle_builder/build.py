@@ -165,7 +165,7 @@ def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
 
 
 def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = False) -> Path:
-    """Write MJCF and the final vehicle file, with the single-track model of the car."""
+    """Write MJCF and vehicle file. The final vehicle file has the single-track model of the car."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
     model = compiled_model(folder / f"{car.name}.xml") if final else None

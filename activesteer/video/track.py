@@ -101,7 +101,7 @@ class Track:
         return self._time_s, self._middles_m
 
     def wheel_centre(self, corner: str, time_s: float) -> Array:
-        """Return the centre of a wheel at a time [m], None if the wheel moves relative to the chassis."""
+        """Return the centre of a wheel at a time [m], for a wheel that does not move relative to the chassis."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(

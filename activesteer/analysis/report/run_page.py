@@ -335,7 +335,7 @@ def results(group: Group) -> list[dict[str, Any]]:
 
 
 def _is_judged(run: ReportedRun) -> bool:
-    """Return whether the difference between two runs can be rated: both are complete and under control."""
+    """Return whether differences from a run can be rated: it is complete, and the car is under control."""
     return not run.problem and is_controlled(run.recording.metrics)
 
 

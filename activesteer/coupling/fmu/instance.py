@@ -32,7 +32,7 @@ START_LIMIT_S: Final = 30.0
 
 
 class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
-    """An FMU failed. The message describes the failure."""
+    """Failure of an FMU, described in the message."""
 
 
 class Group(NamedTuple):

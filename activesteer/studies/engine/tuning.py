@@ -104,7 +104,7 @@ class Tuning:
 
     @property
     def never_together(self) -> list[tuple[str, str]]:
-        """Pairs of statements that hold in some set each, but in no set together."""
+        """Pairs of statements that hold separately, but never in the same set."""
         held = [set(trial.holding) for trial in self.trials] if self.goal is Goal.SATISFY else []
         ever = dict.fromkeys(
             name for trial in self.trials for name in trial.margins if any(name in own for own in held)

@@ -289,7 +289,7 @@ _engine: Final = threading.RLock()
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
-    """The worker of a task died at every attempt."""
+    """Death of the worker of a task at every attempt."""
 
 
 class Outcome(NamedTuple):

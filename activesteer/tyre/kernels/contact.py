@@ -101,7 +101,7 @@ class _Rolling(NamedTuple):
 
 @compiled
 def _mean_decay(x):
-    """Return the mean of exp(-t) over t from 0 to x, the average rest of a decaying rate over a step."""
+    """Return the mean of exp(-t) over t from 0 to x, the average remaining fraction of a rate over a step."""
     return -math.expm1(-x) / x if x > 1e-9 else 1.0
 
 

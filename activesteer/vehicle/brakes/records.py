@@ -219,7 +219,7 @@ def brake_setup(
 
 
 def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
-    """Return the state of released brakes in a rolling car, a `BRAKE_STATE` record."""
+    """Reset a `BRAKE_STATE` record to released brakes in a car that rolls at a speed."""
     state[:] = 0
     state["limit_Pa"] = state["allowed_Pa"] = setup["full_pedal_pressure_Pa"]
     state["drive_limit_Nm"] = NO_LIMIT_NM

@@ -113,7 +113,7 @@ class Signal(NamedTuple):
 
 
 def signal(group: str, name: str, meaning: str, values: Values) -> Signal:
-    """Return a channel stored with 32 bits, in the unit at the end of its name."""
+    """Return the signal of a channel with 32 bits, in the unit at the end of its name."""
     return Signal(Channel(name, unit_of(name), meaning, group), values)
 
 
