@@ -110,7 +110,7 @@ def not_installed(error: type[ActiveSteerError], what: str, package: str, extra:
 
 
 def shown(value: object) -> str:
-    """Return a value as an error message repeats it: its Python form, or a path as text, shortened in the middle."""
+    """Format a value for an error message: its Python form, or a path as a string, shortened in the middle."""
     if isinstance(value, os.PathLike):
         return _shortened(_printable(os.fsdecode(value)), MAX_SHOWN)
     try:

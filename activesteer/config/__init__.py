@@ -479,7 +479,7 @@ def check_points(
     key: str, points: Sequence[float], columns: Mapping[str, Sequence[float] | None], count: Range,
     error: type[ActiveSteerError] = ParameterError,
 ) -> None:  # fmt: skip
-    """Check the points of a curve: increasing, of an allowed number, with columns of equal length."""
+    """Check that the points of a curve increase, are not too few or too many, and have columns of equal length."""
     if not count.low <= len(points) <= count.high:
         raise error(f"has {len(points)} points; allowed is {count}", key=key)
     for before, after in itertools.pairwise(points):

@@ -33,7 +33,7 @@ class ChildFault(Exception):  # noqa: N818 - a fault of the child
 
 
 class Child:
-    """A child process with time limits for its answers, and its process group, which ends with it."""
+    """A child process whose answers have a time limit, and which ends together with its process group."""
 
     def __init__(self, file: str, max_memory_bytes: int | None = None, *, quiet: bool = False) -> None:
         """Start the process."""

@@ -168,7 +168,7 @@ def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M
 def numbers(
     value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M, count: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given, or raise."""
+    """Return the value [m] if it is a list of `count` numbers from `low` to `high`, or raise an error."""
     import numpy as np  # noqa: PLC0415 - slow to import
 
     listed = sequence(value, key)

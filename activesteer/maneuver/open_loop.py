@@ -86,17 +86,17 @@ class SensorOffsetTable:
     """Offsets of the sensors in a repeated measurement: readings minus true values."""
 
     yaw_rate_radps: float = 0.0
-    """Of the yaw rate [rad/s]."""
+    """Offset of the yaw rate [rad/s]."""
     ax_mps2: float = 0.0
-    """Of the longitudinal acceleration [m/s2]."""
+    """Offset of the longitudinal acceleration [m/s2]."""
     ay_mps2: float = 0.0
-    """Of the lateral acceleration [m/s2]."""
+    """Offset of the lateral acceleration [m/s2]."""
     roll_rad: float = 0.0
-    """Of the roll angle [rad]."""
+    """Offset of the roll angle [rad]."""
     pitch_rad: float = 0.0
-    """Of the pitch angle [rad]."""
+    """Offset of the pitch angle [rad]."""
     sideslip_rad: float = 0.0
-    """Of the sideslip angle [rad]."""
+    """Offset of the sideslip angle [rad]."""
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ def _numbered(columns: list[Column]) -> list[Column]:
 
 
 def second_of(name: str) -> str:
-    """Return the name of the second column with a given name."""
+    """Return the name that distinguishes the second column of a name from the first."""
     return f"{name} (2)"
 
 

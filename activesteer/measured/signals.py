@@ -279,7 +279,7 @@ def _sideslip(vx: Array, vy: Array) -> Array:
 
 
 def at_sensor(run: Recording) -> Recording:
-    """Return the motion of the point `sensor_ahead_m` of the manoeuvre, with the offsets in `sensor_offset`."""
+    """Return the motion at the sensors, at `sensor_ahead_m`, with the offsets in `sensor_offset`."""
     # The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
     # a_x - x r^2 with the yaw rate r.
     maneuver = run.metadata.get("maneuver", {})

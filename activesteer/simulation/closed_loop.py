@@ -590,7 +590,7 @@ def _drive_all(records: NDArray[Any]) -> None:
 def drive_together(
     loops: Sequence[ClosedLoop], records: NDArray[Any], call: Callable[[NDArray[Any]], None] = _drive_all
 ) -> dict[int, SimulationDiverged]:
-    """Drive each car for the steps in `left`, with calls of Python at each stop, and return the diverged cars."""
+    """Drive each car for the steps in `left`, execute Python blocks at each stop, and return the diverged cars."""
     failed, status, several = {}, records["status"], len(records) > 1
     while True:
         call(records)

@@ -129,7 +129,7 @@ def note(axis: Axes, text: str, at: tuple[float, float], offset_pt: tuple[float,
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
-    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
+    """Draw the legend of the runs above all axes, with entries for other line styles."""
     # Angles added in front and places with another friction get an entry if they are drawn.
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Figures of kinematics and compliance of both wheels, drawn by matplotlib, an extra."""
+"""Figures of kinematics and compliance of both wheels."""
 
 from __future__ import annotations
 
