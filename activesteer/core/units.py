@@ -219,7 +219,7 @@ def typeset(text: str) -> str:
 
 
 def three_digits(value: float) -> str:
-    """Return a number with three digits, typeset."""
+    """Typeset a number with three digits."""
     return typeset(f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}")
 
 

@@ -90,7 +90,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
 
 
 def told_apart(slopes: Sequence[Array]) -> list[int]:
-    """Return parameters of which a combination has no effect, empty if all can be separated."""
+    """Return the parameters that cannot be told apart, empty if there are none."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []

@@ -157,7 +157,7 @@ class MeasuredFile:
 
     @property
     def on_circle(self) -> dict[str, Any]:
-        """Car of the file on the measured circle: values of `CIRCLE_KEYS`, and overrides."""
+        """Nominal case of the measured circle: values of `CIRCLE_KEYS`, and overrides."""
         return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
     def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -222,7 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer of the package rerun-sdk, not a command `rerun` on the path."""
+    """Return the viewer of the package rerun-sdk, regardless of any command `rerun` on the path."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")

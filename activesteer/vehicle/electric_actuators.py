@@ -117,7 +117,7 @@ class Motors:
     """Motor of the rear right wheel."""
 
     def __post_init__(self) -> None:
-        """Check that each axle has one motor or a pair, and only one motor a differential."""
+        """Check that each axle has one motor or a pair, and that a differential belongs to a single motor."""
         for axle, wheels in AXLES.items():
             pair = [name for name in wheels if getattr(self, name) is not None]
             if pair and getattr(self, axle) is not None:

@@ -71,7 +71,7 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """A car in the form of an export."""
+    """An exported car."""
 
     name: str  # of the vehicle
     variables: list[Variable]  # its variables; the value reference is the place
