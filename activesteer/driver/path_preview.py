@@ -132,7 +132,7 @@ class PathPreviewDriver(NativeBlock):
             self._row_size = row.size
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Adopt the attributes of a copy, whose gains have another address."""
+        """Restore the attributes, and store the gains anew, because a copy has other memory."""
         self.__dict__.update(state)
         self._known = np.zeros(N_SPEEDS)
         for rounded, row in self._gains.items():

@@ -83,7 +83,7 @@ class Motor:
 
     @property
     def wheel_torque_Nm(self) -> float:
-        """Largest torque at the wheels that it drives, together [N m]."""
+        """Largest total torque at the driven wheels [N m]."""
         return self.gear_ratio * max(self.torque_Nm)
 
     @property

@@ -256,7 +256,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
 
 
 def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
-    """Compare the demanded rear and superposed angle, without the hinges' compliance, since the start of steer."""
+    """Return correlation and opposite signs of the demanded rear and superposition angles, from reversal to the end."""
     if not whole:
         return {TOGETHER: {"added_angles_common_s": 0.0}}
     ars, afs = recordings["ars"], recordings["afs"]
