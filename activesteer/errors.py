@@ -17,7 +17,7 @@ _GAP: Final = " ... "
 
 
 class ActiveSteerError(Exception):
-    """Base of every error that activesteer raises on purpose.
+    """Base class of all errors that activesteer raises deliberately.
 
     Its message is one line, made from its attributes.
 
@@ -55,43 +55,43 @@ class ActiveSteerError(Exception):
 
 
 class ParameterError(ActiveSteerError):
-    """A parameter is missing, misspelt, of the wrong type or outside its range."""
+    """Error in a parameter: missing, misspelt, of the wrong type, or outside its range."""
 
 
 class ModelError(ActiveSteerError):
-    """An MJCF model does not compile, or lacks something that a car must have."""
+    """Error in an MJCF model: it does not compile, or lacks a required part."""
 
 
 class ManeuverError(ActiveSteerError):
-    """A manoeuvre file cannot be found, read, or driven."""
+    """Error in a manoeuvre: its file cannot be found, read or driven."""
 
 
 class TyreFileError(ActiveSteerError):
-    """A .tir file cannot be found, read, or used."""
+    """Error in a tyre file: it cannot be found, read or used."""
 
 
 class ControllerError(ActiveSteerError):
-    """A controller cannot be loaded, or returned something other than a steering command."""
+    """Error of a controller: it cannot be loaded, or returned something other than an actuator command."""
 
 
 class DriverError(ActiveSteerError):
-    """A driver cannot be loaded, or returned something other than a driver command."""
+    """Error of a driver: it cannot be loaded, or returned something other than a driver command."""
 
 
 class SimulationDiverged(ActiveSteerError):  # noqa: N818 - an event of the physics, named as one
-    """A state is not finite, or the engine raises a warning. The error holds the recording so far."""
+    """Divergence of a run: a state is not finite, or the engine warns. The error holds the recording so far."""
 
 
 class RecordingError(ActiveSteerError):
-    """A recording cannot be written or read, or has no such channel."""
+    """Error in a recording: it cannot be written or read, or lacks a channel."""
 
 
 class PlaybackError(ActiveSteerError):
-    """A recording cannot be shown: no viewer, no display, or a file that cannot be written."""
+    """Error in a playback: no viewer, no display, or a file that cannot be written."""
 
 
 class StudyError(ActiveSteerError):
-    """A study cannot be started, resumed or shown."""
+    """Error in a study: it cannot be started, resumed or shown."""
 
 
 def not_installed(error: type[ActiveSteerError], what: str, package: str, extra: str) -> ActiveSteerError:
@@ -110,7 +110,7 @@ def not_installed(error: type[ActiveSteerError], what: str, package: str, extra:
 
 
 def shown(value: object) -> str:
-    """Return a value as an error message repeats it: its Python form, or a path as text, shortened in the middle."""
+    """Format a value for an error message: its Python form, or a path as a string, shortened in the middle."""
     if isinstance(value, os.PathLike):
         return _shortened(_printable(os.fsdecode(value)), MAX_SHOWN)
     try:

@@ -1,4 +1,4 @@
-"""Models, manoeuvres and studies of the package, in a checkout, an editable install and an installed wheel.
+"""Models, manoeuvres and studies of the package, in a checkout or an installation.
 
 In a wheel they are inside the package, in `_data/`; in a checkout they are beside the package.
 """

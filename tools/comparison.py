@@ -1,6 +1,6 @@
 """Comparison of controllers in the paper's five scenarios and five harder ones, with the sensors of production cars.
 
-`python tools/renew.py controllers` prints the table and the targets of docs/chassis_control.md, and keeps the
+`python tools/renew.py controllers` prints the table and the targets of docs/controller_design.md, and keeps the
 recordings; `renew.py comparison` counts harm over a population. The targets were set before any of these controllers
 was tuned. For your own car and controllers, `activesteer study side_by_side -c CONTROLLER` drives the same scenarios.
 """
@@ -323,7 +323,7 @@ def comparison_text(found: Population) -> str:
     lines = [
         f"{found.samples} samples of {found.vehicle}, seed {found.seed}; changes against {NONE}, medians",
         "",
-        _ROW.format("", "harmed", "worst track", "saves of", "spoils of", "sideslip", "steering"),
+        _ROW.format("", "harmed", "deviation", "saves of", "spoils of", "sideslip", "steering"),
         _ROW.format("", "", "[m]", "the lost", "the fine", "peak", "rms"),
     ]
     effects = [*found.systems, *(found.total(name) for name in found.controllers)]
@@ -420,7 +420,7 @@ def _legend(better: str, worse: str, neutral: str) -> list[tuple[str, str]]:
 
 
 def comparison_population_figure(made: Population) -> Figure:
-    """Return the figure of a comparison over a population: counts and worst tracks by scenario and controller."""
+    """Return the figure of a comparison over a population: counts and largest deviations by scenario and controller."""
     names = list(dict.fromkeys(effect.controller for effect in made.systems))
     scenarios = list(dict.fromkeys(effect.scenario for effect in made.systems))
     rows, blank = [name.replace("_", " ") for name in scenarios], [""] * len(scenarios)
@@ -436,7 +436,7 @@ def comparison_population_figure(made: Population) -> Figure:
     tracks = np.array([[cell.worst_track_m if cell else math.nan for cell in row] for row in cells])
     texts = [["-" if math.isnan(track) else f"{track:.2f}" for track in row] for row in tracks.tolist()]
     shades = -np.minimum(tracks / TRACK_HARM_M, 1.0)
-    panels.append(Heat(shades, texts, names, blank, (-1.0, 1.0), _COLOURS, "worst growth of\nthe track error [m]"))
+    panels.append(Heat(shades, texts, names, blank, (-1.0, 1.0), _COLOURS, "largest additional\ndeviation [m]"))
     legend = _legend("better", f"worse; full colour: all runs, or {TRACK_HARM_M:g} m", "as without control")
     title = f"{made.samples} samples of {made.vehicle}, seed {made.seed}; -: no such run"
     width_in, height_in = 2.0 + 1.5 * max(len(names), 4), 1.4 + 0.3 * len(scenarios)

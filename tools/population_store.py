@@ -146,9 +146,11 @@ def _comparison(found: Population) -> list[str]:
     names = found.controllers
     versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
     totals = [found.total(name) for name in names]
+    every = found.samples * len(found.vehicle.split(", ")) * (1 + len(names))
     lines = [
         f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
-        f"{found.failed} runs are left out: the road does not bear the turn, or the rear axle cannot carry the screw.",
+        f"{found.failed} of {every} runs are left out. Friction does not allow their turn, or the rear screw actuator "
+        "does not fit the rear axle of the car.",
         "",
         *_head("runs with harm", names),
     ]
@@ -176,19 +178,19 @@ def _comparison(found: Population) -> list[str]:
         for effect in found.against_required
     ]
     if against:
-        lines += ["", *_head(f"against `{REQUIRED}` in place of `{NONE}`", ["runs with harm", *_WORST], "")]
+        lines += ["", *_head(f"compared with `{REQUIRED}` instead of `{NONE}`", ["runs with harm", *_WORST], "")]
         lines += [_row(head, cells) for head, *cells in against]
-    caption = "Harmed and saved runs, and the worst track, by scenario and controller"
+    caption = "Harmed and saved runs, and the largest additional deviation, by scenario and controller"
     return [*lines, "", f"![{caption}](pictures/comparison_population.png)"]
 
 
 _WORST: Final = {
-    "worst track, m": ("lane", "path"),
+    "worst additional deviation, m": ("lane", "path"),
     "worst stop, m": ("stopping",),
-    "worst stop without a line, m": ("stopping_elsewhere",),
+    "worst stop off the line, m": ("stopping_elsewhere",),
     "worst heading, deg": ("heading",),
 }
-"""Row of the table -> measures of harm. A car without a line leaves it without control."""
+"""Row of the table -> measures of harm. A car off the line leaves its line without control."""
 
 
 def _worst(effect: SystemEffect, measures: Sequence[str]) -> str:

@@ -41,7 +41,7 @@ def _judge(options: Options) -> int:
 
 
 def _around(options: Options) -> int:
-    """Drive the two populations around the paper's setting, whose shares stand in docs/claims.md."""
+    """Drive the two populations around the paper's setting, whose shares stand in docs/claims_other_cars.md."""
     from tools.population_store import renew_around
 
     renew_around(options.output or Path("build", "around"), options.samples, options.jobs)
@@ -66,7 +66,7 @@ def _comparison(options: Options) -> int:
 
 
 def _controllers(options: Options) -> int:
-    """Drive five scenarios of the paper and five harder ones, and print the table of docs/chassis_control.md."""
+    """Drive five scenarios of the paper and five harder ones, and print the table of docs/controller_design.md."""
     from tools.comparison import COMPARED, compare
 
     controllers = options.controllers.split(",") if options.controllers else COMPARED
@@ -79,10 +79,11 @@ def _controllers(options: Options) -> int:
 
 
 def _claims(_: Options) -> int:
-    """Write the table of docs/claims.md from the stored populations."""
-    from tools.tables import CLAIMS_PAGE, claims_page
+    """Write the tables of docs/claims.md and docs/claims_other_cars.md from the stored populations."""
+    from tools.tables import CLAIMS_PARTS, claims_page
 
-    CLAIMS_PAGE.write_text(claims_page(CLAIMS_PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for page in CLAIMS_PARTS:
+        page.write_text(claims_page(page), encoding="utf-8")
     return 0
 
 

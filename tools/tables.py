@@ -22,13 +22,16 @@ from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting
 from activesteer.config import Range, dataclass_in, element_of, spellings
 from activesteer.controllers import load_controller
+from activesteer.core.units import parameter_label
 from activesteer.maneuver import KINDS
 from activesteer.maneuver.base import Maneuver
 from tools.make_setting import AROUND
-from tools.population_results import Population, read_population
+from tools.population_results import NO_FACTOR, ClaimProportion, Population, read_population
 from tools.proportions import percent
 
-CLAIMS_PAGE: Final = Path(__file__).parents[1] / "docs" / "claims.md"
+DOCS: Final = Path(__file__).parents[1] / "docs"
+CLAIMS_PAGE: Final = DOCS / "claims.md"
+OTHER_CLAIMS_PAGE: Final = DOCS / "claims_other_cars.md"
 VEHICLE: Final = "compact"
 SENSORS: Final = "sensors.preset"
 PRESETS: Final = ("ideal", "production")
@@ -47,7 +50,7 @@ def claims_table() -> list[str]:
         lines += [f"**{kind.value.capitalize()}**", ""]
         lines += [
             "| | claim | paper's setting | driver from literature | population, % | ideal, production sensors, % | "
-            "depends most on |",
+            "holds more often with |",
             "|---|---|---|---|---|---|---|",
         ]
         for statement in STATEMENTS.values():
@@ -114,16 +117,30 @@ def _proportion(population: Population | None, number: str) -> tuple[str, str, s
         return "", "", ""
     interval = f"{percent(found.low)} to {percent(found.high)}"
     sensors = ", ".join(percent(found.at[f"{SENSORS} = {preset}"]) for preset in PRESETS)
-    return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, found.words
+    return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, _condition(found)
 
 
-CLAIMS_PARTS: Final = {"counts": summary, "table": claims_table, "shares": around_setting}
-"""Part of the page of the claims that stands between its marks -> function that writes its lines."""
+def _condition(found: ClaimProportion) -> str:
+    """Return the value or direction of the strongest factor at which a claim holds more often."""
+    if found.depends_on == NO_FACTOR:
+        return ""
+    if found.depends_on == SENSORS:
+        return f"{max(PRESETS, key=lambda preset: found.at[f'{SENSORS} = {preset}'])} sensors"
+    label = parameter_label(found.depends_on)[0].replace(": ", " ")
+    return (f"{label} in the middle or at the ends of its range", f"higher {label}", f"lower {label}")[found.direction]
 
 
-def claims_page(text: str) -> str:
-    """Return the page of the claims with its tables renewed."""
-    for name, write in CLAIMS_PARTS.items():
+CLAIMS_PARTS: Final = {
+    CLAIMS_PAGE: {"counts": summary, "table": claims_table},
+    OTHER_CLAIMS_PAGE: {"shares": around_setting},
+}
+"""Page of the claims -> name of each generated table -> function that writes its lines."""
+
+
+def claims_page(page: Path) -> str:
+    """Return the text of a page of the claims with its tables renewed."""
+    text = page.read_text(encoding="utf-8")
+    for name, write in CLAIMS_PARTS[page].items():
         verb = "is" if name == "table" else "are"
         begin = f"<!-- the {name} {verb} written by tools/renew.py claims -->\n"
         end = f"<!-- end of the {name} -->\n"

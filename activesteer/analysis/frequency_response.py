@@ -1,4 +1,4 @@
-"""Frequency responses of recorded runs to their steering by ISO 7401: continuous and random input.
+"""Frequency responses of recorded runs to their steering (ISO 7401), for continuous and random input.
 
 The run begins and ends with the car going straight, so that the discrete Fourier transform of the whole run has no
 leakage. The response at a frequency is the cross spectrum over the spectrum of the input, both summed over the
@@ -69,7 +69,7 @@ def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Arra
 def _response_of(
     frequency_Hz: NDArray[np.floating], power_u: Array, power_y: Array, cross: NDArray[np.complex128], largest: float
 ) -> FrequencyResponse:
-    """Return the estimate H1 and the coherence from powers of input and output and their cross spectrum."""
+    """Return the H1 estimate and the coherence, from the spectra of input and output and their cross spectrum."""
     missing = ~(power_u > MIN_SPECTRUM**2 * largest)
     if missing.any():
         raise RecordingError(
@@ -119,7 +119,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _falls_to(x: NDArray[np.floating], y: Array, level: float) -> float:
-    """Return the first abscissa where y falls to a level, interpolated, or nan if it never does."""
+    """Return the first interpolated abscissa where y falls to a level, nan if y never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
         return math.nan
@@ -136,7 +136,7 @@ _HANN_OVERLAP: Final = 1.0 + 2.0 / 36.0
 def random_response(
     recordings: Sequence[RecordingLike], output: str, lowest_Hz: float, highest_Hz: float
 ) -> FrequencyResponse:
-    """Return the response of a channel to random steering, at all lines of a range, from runs with one time step."""
+    """Return the response of a channel to random steering in a frequency range, averaged over runs."""
     # The segments are finite, and the response to the end of a segment is lost. The gain is therefore low by some per
     # mille if the response dies away within a second. The error holds for small deviations: coherence above some 0.3.
     if not recordings:

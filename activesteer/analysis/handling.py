@@ -1,4 +1,4 @@
-"""Steady-state handling from a slow ramp at constant speed or on a constant radius, by ISO 4138.
+"""Steady-state handling (ISO 4138) from a slow ramp, at constant speed or on a constant radius.
 
 The understeer gradient is the gradient of the steer angle (steering wheel over overall ratio) over lateral
 acceleration, less the gradient of the Ackermann angle l/R. With the measured curvature, yaw rate over speed, both tests
@@ -67,7 +67,7 @@ def car_of(recording: RecordingLike) -> CarGeometry:
 
 
 def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[str, float]:
-    """Return the steady-state handling from a slow ramp, by default for the car in the recording's metadata."""
+    """Return the steady-state handling from a slow ramp."""
     car = car or car_of(recording)
     ay = recording["ay_mps2"]
     side = math.copysign(1.0, float(ay[int(np.abs(ay).argmax())]))
@@ -154,7 +154,7 @@ def _line(x: Array, y: Array) -> tuple[float, float]:
 
 
 def _moving_average(values: Array, step_s: float) -> Array:
-    """Return the mean over a window around every sample, which is cut at the ends of the signal."""
+    """Return the moving mean of a signal, with windows that are cut at its ends."""
     half = max(1, round(0.5 * SMOOTHING_S / step_s))
     total = np.concatenate(([0.0], np.cumsum(values)))
     index = np.arange(len(values))

@@ -41,7 +41,7 @@ LOST: Final = "lost"
 
 
 def has_spun(metrics: Metrics) -> bool:
-    """Return whether the sideslip exceeded `LOST_SIDESLIP_RAD`, or whether the run ended too early to tell."""
+    """Return whether the car spun. A run that ended too early to tell counts as a spin."""
     # Where the manoeuvre has no peak of the sideslip, as in straight braking, the heading at the end counts.
     names = SIDESLIP_PEAKS if any(name in metrics for name in SIDESLIP_PEAKS) else ("heading_end_rad",)
     peak = next((abs(value) for name in names if (value := metrics.get(name)) is not None), math.nan)
@@ -49,12 +49,12 @@ def has_spun(metrics: Metrics) -> bool:
 
 
 def is_lost(metrics: Metrics) -> bool:
-    """Return whether the car was lost: it spins, leaves its lanes, or misses (not just touches) a cone of a slalom."""
+    """Return whether the car lost control: it spun, left its lanes, or missed a cone of a slalom."""
     return has_spun(metrics) or _leaves_course(metrics)
 
 
 def is_controlled(metrics: Metrics) -> bool:
-    """Return whether no metric shows that the car was lost."""
+    """Return whether no metric shows a loss of control."""
     # Some manoeuvres have no metric that could.
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
     return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
@@ -99,7 +99,7 @@ def failures(recording: Recording) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Yield the requirements that a run with these metrics met, none if the manoeuvre has none."""
+    """Yield the requirements of the manoeuvre that a run with these metrics met."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):
@@ -151,7 +151,7 @@ SIZES: Final[dict[str, float | None]] = {
 
 
 def measured(metrics: Metrics) -> dict[str, float]:
-    """Return the measures that the manoeuvre of a run has [SI], infinite where the run does not define one."""
+    """Return the measures of harm that the manoeuvre of a run has [SI], infinite where the run does not define one."""
     known = {name: math.nan if value is None else value for name, value in metrics.items()}
     missed = known.get(CONES_MISSED, 0.0)
     found = {"lost": float(has_spun(metrics) or missed != 0.0)}
@@ -182,7 +182,7 @@ def measured(metrics: Metrics) -> dict[str, float]:
 
 
 def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
-    """Return the growth of each measure by a controller [SI], for the measures that the manoeuvre has."""
+    """Return the growth of each measure of harm by a controller [SI]."""
     found, all_before, all_after = {}, measured(without), measured(controlled)
     for name in SIZES:
         if name not in all_before and name not in all_after:
@@ -195,7 +195,7 @@ def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
 
 
 def harms(change: Mapping[str, float]) -> list[str]:
-    """Return the measures that grew by more than their size."""
+    """Return the measures of harm that grew by more than their size."""
     return [name for name, growth in change.items() if (size := SIZES[name]) is not None and growth > size]
 
 

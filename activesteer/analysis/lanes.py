@@ -37,7 +37,7 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
 
 
 def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
-    """Return whether the whole body passes every lane to its end and never crosses a side."""
+    """Return whether the whole body passes all lanes within their sides."""
     # A car that turns round before the last lane crosses no side there, but it does not keep to the lanes.
     for x, _ in corners(recording, car):
         for lane in course.lanes:
@@ -55,7 +55,7 @@ def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> 
 
 
 def _distances(recording: RecordingLike, points_m: Array, car: Footprint) -> Array:
-    """Return the smallest distance of each point, shape (n, 2), from the body over the run [m], below 0 inside."""
+    """Return the smallest distance between each point and the body over the run [m], negative inside the body."""
     front_x, front_y, cos, sin = _pose(recording)
     middle_m = 0.5 * (car.front_m + car.rear_m)
     half_length_m = car.front_m - middle_m
@@ -91,7 +91,7 @@ def corners(recording: RecordingLike, car: Footprint) -> list[tuple[Array, Array
 
 
 def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
-    """Return world x and y of the front axle centre [m], cosine and sine of the yaw angle, over time."""
+    """Return position and direction of the front axle over time: x and y [m], cosine and sine of the yaw angle."""
     yaw = recording["yaw_rad"]
     return *front_axle(recording), np.cos(yaw), np.sin(yaw)
 
@@ -101,18 +101,18 @@ _NEAR: Final = 10
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:
-    """Return world x and y of the front axle centre over time [m], shape (n,) each."""
+    """Return world x and y of the front axle centre over time [m]."""
     return recording["front_axle_x_m"], recording["front_axle_y_m"]
 
 
 def first_at(recording: RecordingLike, x_m: float) -> int | None:
-    """Return the first sample where the front axle centre has reached an x, or None if it never has."""
+    """Return the first sample at which the front axle centre has reached an x, or None."""
     reached = np.flatnonzero(front_axle(recording)[0] >= x_m)
     return int(reached[0]) if reached.size else None
 
 
 def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> Array:
-    """Return the distance of points from a path of straight pieces, which continues straight beyond both of its ends.
+    """Return the distances of points from a polyline, which continues straight beyond both ends.
 
     The nearest point of the path lies on a piece beside the nearest corner point.
     """
@@ -142,7 +142,7 @@ def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> A
 
 
 def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -> float:
-    """Return the final heading of the car relative to the nearest piece of a path, -pi to pi [rad]."""
+    """Return the final heading of the car relative to the nearest segment of a path [rad]."""
     # A car that turned around several times has its whole turns left out.
     x, y = (channel[-1] for channel in front_axle(recording))
     nearest = int(np.argmin(np.hypot(path_x_m - x, path_y_m - y)))
@@ -152,7 +152,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return the distance of a car along a path, which may cross itself, and to the left of the path [m]."""
+    """Return the position of a car relative to a path: distance along it and to its left [m]."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):
@@ -167,7 +167,7 @@ def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
 
 
 def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
-    """Return world y of the front axle centre when it first passes each x, interpolated [m], shape (n,)."""
+    """Return the lateral position of the front axle centre when it first passes each x [m], shape (n,)."""
     # The values of x ascend; y is nan where the run never gets there.
     x, y = front_axle(recording)
     # A car that spins may go back: only samples ahead of all earlier ones count.
@@ -189,7 +189,7 @@ BESIDE_M: Final = 2.0
 
 
 class CourseView(NamedTuple):
-    """A course as it is drawn."""
+    """Geometry of a course in a figure."""
 
     x_m: tuple[float, float]  # limits of x [m]
     y_m: tuple[float, float]  # limits of y [m]
@@ -198,7 +198,7 @@ class CourseView(NamedTuple):
 
 
 def view_of(course: Course) -> CourseView:
-    """Return the view from before the first gate to behind the last gate, or of the whole path without gates."""
+    """Return the part of a course to show: all gates, or the whole path of a course without gates."""
     path = course.path
     sides = [y for lane in course.lanes for y in (lane.right_y_m, lane.left_y_m)]
     every_y = np.concatenate([path.y_m, course.cones_m[:, 1], sides])
@@ -215,7 +215,7 @@ TIME_TOLERANCE_S: Final = 0.02
 
 
 def corridor(time_s: Array, values: Array, width: float | Array) -> tuple[Array, Array]:
-    """Return the lower and the upper edge of a corridor around a signal, with tolerances in time and value."""
+    """Return the lower and the upper edge of a tolerance corridor around a signal."""
     fine = np.linspace(-TIME_TOLERANCE_S, TIME_TOLERANCE_S, 9)
     moved = np.stack([np.interp(time_s + shift, time_s, values) for shift in fine])
     return moved.min(axis=0) - width, moved.max(axis=0) + width

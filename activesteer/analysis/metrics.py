@@ -1,4 +1,4 @@
-"""The metrics of a recording: the general ones, and the ones of its kind of manoeuvre.
+"""The metrics of a recording: general metrics and metrics of its manoeuvre.
 
 The latter are sizes, energy, ride and rollover.
 

@@ -90,7 +90,7 @@ def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, slice]:
-    """Return the samples before the last gate, between the gates, and in the 3 s after the last gate."""
+    """Return the samples of three phases: before the last gate, between the gates, and 3 s after the last gate."""
     # A path without gates is all approach.
     nothing = slice(0, 0)
     if course.last_gate_x_m is None:
@@ -108,7 +108,7 @@ def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, sl
 
 
 def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
-    """Return the metrics of distances from path, lanes and cones, and of a lap on a path without gates."""
+    """Return the metrics of distances from path, lanes and cones, and of the lap time."""
     x, y = lanes.front_axle(recording)
     lap: dict[str, float] = {}
     if course.last_gate_x_m is None:  # such a path may cross itself

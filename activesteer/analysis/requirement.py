@@ -45,7 +45,7 @@ _LONGEST: Final = 1000
 
 
 def distance(margin: float) -> float:
-    """Return the distance from passing: 0 if it passes, 0.5 one scale from the limit, 1 far away or undefined."""
+    """Return the distance from passing: 0 if it passes, 0.5 one scale from the limit, towards 1 far away."""
     if margin >= 0.0:
         return 0.0
     return max(1e-6, margin / (margin - 1.0)) if math.isfinite(margin) else 1.0
@@ -56,7 +56,7 @@ def _margin(room: float, limit: float) -> float:
 
 
 class EvaluatedRun(NamedTuple):
-    """Place of a run in a set: its controller and its manoeuvre."""
+    """Run of a set, given by controller and manoeuvre."""
 
     controller: str
     maneuver: str
@@ -79,7 +79,7 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """A number over the metrics of runs.
+    """Number that follows from the metrics of runs.
 
     `metrics` has those that it reads, each with its run.
 
@@ -89,7 +89,7 @@ class Expression:
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 
     def __init__(self, text: str, names: Names, source: Source, where: tuple[str, ...]) -> None:
-        """Read an expression, with its place in the source for errors."""
+        """Parse an expression."""
         self.text, self._names = text, names
         self.metrics: dict[tuple[str, EvaluatedRun], None] = {}
         self.comparisons: list[tuple[_Number, str, _Number]] = []
@@ -105,7 +105,7 @@ class Expression:
             raise self._fail("there is no metric of a run, such as lane_overstep_m(none),")
 
     def __call__(self, runs: Runs) -> float:
-        """Return the value, or nan if it is not defined."""
+        """Return the value, nan if it is not defined."""
         return self._value(runs)
 
     def undefined(self, runs: Runs) -> set[str]:
@@ -169,7 +169,7 @@ class Expression:
 
 
 class Requirement(Expression):
-    """A comparison, or several joined by `and` and `or`. Its value is a margin, negative if it is violated."""
+    """Comparison, or comparisons joined by `and` and `or`, with a margin that is negative if violated."""
 
     wanted = "a comparison such as stopping_distance_m(none) <= 45 is needed"
 
@@ -189,7 +189,7 @@ class Requirement(Expression):
         return lambda runs: _all([margin(runs) for margin in margins])
 
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
-        """Return the margin to the limit. The limit is the side without a metric, or else the right side."""
+        """Return the margin to the limit, the side without a metric, or else the right side."""
         one, other = self._number(left), self._number(right)
         self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
@@ -217,14 +217,14 @@ def _value_of(name: str, run: EvaluatedRun) -> _Number:
 
 
 def _ratio(one: float, other: float) -> float:
-    """Return the quotient, or infinite for a division of another number by 0."""
+    """Divide, with an infinite quotient for a division by 0."""
     if other:
         return one / other
     return math.copysign(math.inf, one) if one else math.nan
 
 
 def _all(margins: Sequence[float]) -> float:
-    """Return the smallest margin, or nan if one is not defined and no other is negative."""
+    """Return the smallest margin, nan if it is not known."""
     known = [margin for margin in margins if not math.isnan(margin)]
     return min(known) if len(known) == len(margins) or min(known, default=0.0) < 0.0 else math.nan
 

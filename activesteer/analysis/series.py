@@ -1,4 +1,4 @@
-"""Sampled signals: smoothing, filters, offsets, crossings, and the response to a step.
+"""Operations on sampled signals: smoothing, filters, offsets, crossings and step responses.
 
 Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
 """
@@ -35,7 +35,7 @@ PEAK_MARGIN: Final = 0.005
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
-    """Return the sideslip angles [rad] in a part of a run, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`."""
+    """Return the sideslip angles [rad] in a range of samples, while the car is faster than `ANGLES_COUNT_ABOVE_MPS`."""
     # Without a speed, as in measured data, all samples count. If none counts, there is one sample of 0.
     sideslip_rad = recording["sideslip_rad"][part]
     try:
@@ -46,12 +46,12 @@ def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
 
 
 def counted(recording: RecordingLike, channel: str, part: slice = _ALL) -> Array:
-    """Return the samples of a channel that count in metrics: all, or for a sideslip angle `counted_sideslip`."""
+    """Return the samples of a channel that count in metrics (see `counted_sideslip`)."""
     return counted_sideslip(recording, part) if channel == "sideslip_rad" else recording[channel][part]
 
 
 def peak(recording: RecordingLike, channel: str, part: slice = _ALL) -> dict[str, float]:
-    """Return the metric of the peak of a channel in a part of a run."""
+    """Return the metric of the peak of a channel in a range of samples."""
     name, _, unit = channel.rpartition("_")
     return {f"{name}_peak_abs_{unit}": float(np.abs(counted(recording, channel, part)).max())}
 
@@ -102,7 +102,7 @@ def rate_rms(values: Array, timestep_s: float) -> float:
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square, in the unit of the values, or nan for no values."""
+    """Return the root mean square, nan for no values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
 
 
@@ -141,7 +141,7 @@ def timestep(time_s: Array) -> float:
 def step_response(
     time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float
 ) -> dict[str, float]:
-    """Return steady state, response time, peak, peak time and overshoot of a signal, with times from the step.
+    """Return the metrics of a step response: steady state, response time, peak, peak time and overshoot.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal
@@ -171,7 +171,7 @@ _ENDS_PERIODS: Final = 6.0
 
 
 def low_pass(values: Array, timestep_s: float, cut_off_Hz: float, poles: int = 12) -> NDArray[np.float64]:
-    """Apply a Butterworth filter without phase, with half of its poles forwards and half backwards.
+    """Apply a zero-phase Butterworth filter, with half of its poles forwards and half backwards.
 
     Both passes have the given cut-off frequency; together they halve a sine of this frequency.
 
@@ -211,7 +211,7 @@ _AVERAGED_S: Final = 0.1
 
 
 def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """Return the range for zeroing: the second before the steering wheel turns fast."""
+    """Return the samples for zeroing: the second before the steering wheel turns fast."""
     step_s = timestep(time_s)
     width = max(1, round(_AVERAGED_S / step_s))
     rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
@@ -226,6 +226,6 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 
 
 def offset(values: Array, samples: slice) -> float:
-    """Return the mean of a signal over some samples, or 0 for no samples."""
+    """Return the mean of a signal over some samples, 0 for no samples."""
     # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
     return float(np.mean(values[samples])) if samples.stop > samples.start else 0.0

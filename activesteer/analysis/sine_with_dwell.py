@@ -97,7 +97,7 @@ def steering(recording: RecordingLike) -> Steering:
 
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
-    """Return the times that plots over time mark, with their labels.
+    """Return the times to mark in plots over time, with their labels.
 
     They are instants of the criterion, phases that begin, or the beginning of braking.
     """
@@ -194,7 +194,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
-    """Return time and value of the first prominent maximum after a time, or of the largest value without one."""
+    """Return time and value of the first prominent maximum after a time, or else of the largest value."""
     from scipy.signal import find_peaks  # noqa: PLC0415 - takes half a second to import
 
     after = np.flatnonzero(time_s >= begin_s)
@@ -214,7 +214,7 @@ def _displacement(recording: RecordingLike, times: Steering) -> float:
 
 
 def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> float:
-    """Return the displacement 1.07 s after the start of steer, integrated twice [m] (FMVSS 126, S7.11.9)."""
+    """Return the lateral displacement 1.07 s after the start of steer [m] (FMVSS 126, S7.11.9)."""
     end_s = begin_s + DISPLACEMENT_TIME_S
     if end_s > time_s[-1]:
         return math.nan
@@ -224,5 +224,5 @@ def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> fl
 
 
 def _at(time_s: Array, values: Array, instant_s: float) -> float:
-    """Return the value at a time, interpolated, or nan after the end of the run."""
+    """Return the interpolated value at a time, nan after the end of the run."""
     return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

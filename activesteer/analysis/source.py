@@ -1,4 +1,4 @@
-"""Interface of a recording for the analysis: arrays by channel name, their time, and the metadata."""
+"""Interface of a recording for the analysis: channels by name, times and metadata."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class RecordingLike(Protocol):
 
 
 class Evaluable:
-    """A recorded run whose channels can be evaluated: finite, with two rows or more."""
+    """A recorded run that can be evaluated: finite values, at least two rows."""
 
     def __init__(self, recording: RecordingLike) -> None:
         """Reject a run that is too short."""
@@ -59,7 +59,7 @@ _MAX_VALUE: Final = 1e30
 
 
 def entry(recording: RecordingLike, table: str, key: str) -> str:
-    """Return an entry of a table of the metadata as text, or empty if it does not exist."""
+    """Return an entry of a metadata table as a string, empty if it does not exist."""
     values = recording.metadata.get(table)
     return str(values.get(key, "")) if isinstance(values, Mapping) else ""
 

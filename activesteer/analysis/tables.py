@@ -23,7 +23,7 @@ TYRE_USE_NOTE: Final = (
 
 
 def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = None) -> str:
-    """Return a table with a row per metric and a column per run."""
+    """Return a table of metrics (rows) and runs (columns)."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows, first = [["", "", *runs]], next(iter(runs.values()), {})
     for name in names:
@@ -78,14 +78,14 @@ def is_near(name: str, value: float, first: float) -> bool:
 
 
 class Cell(NamedTuple):
-    """Text of a number, or of a difference with its percentage of the first run's value if that is meaningful."""
+    """Format a number, or a difference with its percentage of the first run's value if meaningful."""
 
     text: str
     percent: str = ""
 
 
 def number(name: str, value: float) -> str:
-    """Write the value of a metric [SI] with three decimals, with fewer for large values, and as a dash for nan."""
+    """Format the value of a metric [SI]."""
     if not math.isfinite(value):
         return "\N{EN DASH}"
     metric = recorded_metric(name)

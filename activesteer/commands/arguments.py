@@ -41,7 +41,7 @@ Part = Callable[[Any], object]
 
 
 class Group:
-    """Group of commands in `--help`. Call it with a declaration to decorate the function of a command."""
+    """Group of commands in `--help`. Its call decorates the function of a command."""
 
     def __init__(self, title: str) -> None:
         self.title = title
@@ -57,13 +57,13 @@ class Group:
         return declare
 
     def with_actions(self, name: str, help: str) -> Group:
-        """Declare a command of several actions, which are declared with the returned group."""
+        """Declare a command with several actions, to be declared with the returned group."""
         actions = Group(name)
         self.commands.append((name, help, f"{help[0].upper()}{help[1:]}.", (), actions))
         return actions
 
     def add_to(self, parsers: Any, *, listed: bool = False) -> None:
-        """Add the commands to the parsers of `argparse`, which lists them if they are actions of a command."""
+        """Add the commands to the parsers of `argparse`."""
         for name, help, description, parts, action in self.commands:
             parser = parsers.add_parser(name, description=description, **({"help": help} if listed else {}))
             for part in parts:
@@ -76,7 +76,7 @@ class Group:
 
 
 class CommandLine:
-    """All commands of the program, with their `names`, listed by `--help` in groups."""
+    """All commands of the program, in the groups of `--help`."""
 
     def __init__(self, version: str, groups: Sequence[Group]) -> None:
         self._parser = argparse.ArgumentParser(
@@ -97,7 +97,7 @@ class CommandLine:
         self.names = [name for group in groups for name, *_ in group.commands]
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
-        """Parse a command line, or end the program with a correction if it is wrong."""
+        """Parse a command line, or end the program with a suggested correction."""
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
         if command in SUCCESSORS:
@@ -112,7 +112,7 @@ class CommandLine:
 
 
 def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -> str:
-    """Return the correction of an unknown argument."""
+    """Return the suggested correction of an unknown argument."""
     known = list(parser._option_string_actions)
     option = unknown.partition("=")[0]
     if successor := SUCCESSORS.get(f"{parser.prog.split()[-1]} {option}"):
@@ -129,7 +129,7 @@ def _hint(parser: argparse.ArgumentParser, words: Sequence[str], unknown: str) -
 
 
 def option(names: str, metavar: str | tuple[Any, ...], help: str, default: Any = None, **words: Any) -> Part:
-    """Declare an argument with a value, and with help that ends with the default if there is one."""
+    """Declare an argument with a value. The default is appended to its help."""
     if words.pop("many", False):
         words["action"] = "append"
     words["metavar" if isinstance(metavar, str) else "choices"] = metavar
@@ -177,7 +177,7 @@ RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are com
 
 
 def driver(default: str = "") -> Part:
-    """Return the option `--driver`, which is None if it is not given and its default is described in words."""
+    """Return the option `--driver`, None if not given."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
         return option("--driver", "DRIVER", f"{words} (default: {default})")
@@ -185,7 +185,7 @@ def driver(default: str = "") -> Part:
 
 
 def controllers(default: str = "none") -> Part:
-    """Return the option `-c`, a list of controllers, or None if it is not given. `default` describes the default."""
+    """Return the option `-c`, a list of controllers, None if not given."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )
@@ -193,7 +193,7 @@ def controllers(default: str = "none") -> Part:
 
 
 def output(metavar: str, help: str, default: str | None = None) -> Part:
-    """Return the option `-o` for a file or folder. Without a default, `help` says what happens without it."""
+    """Return the option `-o` for a file or folder."""
     return option("-o --output", metavar, help, None if default is None else Path(default), type=Path)
 
 
@@ -208,7 +208,7 @@ def check_effect(options: argparse.Namespace, effect: str, *keys: str) -> None:
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers of an option, which are separated by commas."""
+    """Return the numbers of a comma-separated option."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -216,7 +216,7 @@ def numbers(text: str) -> list[float]:
 
 
 def overrides_of(options: argparse.Namespace, given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the overrides of `--overrides` and `--set`. Values that are not TOML are texts."""
+    """Return the overrides of `--overrides` and `--set`. Values that are not valid TOML become strings."""
     from activesteer.config import parse_value, read_toml
 
     values = dict(given or {})

@@ -60,7 +60,7 @@ def _titles(names: Iterable[str], find: Callable[[str], Path]) -> dict[str, str]
 
 
 class _Failures(dict[str, str]):
-    """Error messages by the label of the failed controller."""
+    """Error messages, by the label of the failed controller."""
 
     @contextmanager
     def caught(self, label: str, *, alone: bool) -> Iterator[None]:
@@ -222,7 +222,7 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
 def _paint(
     metrics: Mapping[str, Mapping[str, float]], run: str, name: str, value: float, first: float, text: str
 ) -> str:
-    """Return a value in green if better than in the first run, in red if worse, and plain if a run is lost."""
+    """Format a value: green if better than in the first run, red if worse, plain if a run lost control."""
     from activesteer.analysis.harm import is_controlled
     from activesteer.analysis.tables import Change, significance
 
@@ -288,7 +288,7 @@ def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
 
 
 def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Path]:
-    """Draw all runs in one figure, and for a step steer the car without control next to its linear models."""
+    """Draw all runs in one figure. For a step steer, also draw the car without control and its linear models."""
     from activesteer.analysis.figures import figure_2, figure_for
     from activesteer.studies.reproduction import models_beside
 

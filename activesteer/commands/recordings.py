@@ -86,7 +86,7 @@ def _info(options: argparse.Namespace) -> None:
 
 
 def _driver(recorded: Any) -> str:
-    """Name and parameters of the driver, or only the name in recordings of earlier versions."""
+    """Name and parameters of the driver. Recordings of earlier versions hold only the name."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)

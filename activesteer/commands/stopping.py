@@ -1,4 +1,4 @@
-"""End of a command after Ctrl-C or SIGTERM: within a second, with one line about saved files, without a traceback.
+"""End of a command within a second of Ctrl-C or SIGTERM, with one line about saved files.
 
 The signal raises KeyboardInterrupt in the command, which closes files and ends worker processes. A thread ends the
 process if that takes too long: native code may run, or user code may have caught the exception.
@@ -116,7 +116,7 @@ class StopSignals:
             os._exit(128 + number)
 
     def _saved(self, *, in_order: bool) -> str:
-        """Return a text that names the files that the command has written."""
+        """Return a message with the files that the command has written."""
         output: Path | None = getattr(self.options, "output", None)
         own: list[Path] | None = getattr(self.options, "saved", None)
         if own is None:
@@ -143,7 +143,7 @@ def _files(output: Path | None) -> list[Path]:
 
 
 def _part(path: Path, *, in_order: bool) -> str:
-    """Describe how much of a run a recording holds. The text is empty for a complete run and other files."""
+    """Describe how much of a run a recording holds, empty for a complete run and for other files."""
     if path.suffix != ".mcap":
         return ""
     with path.open("rb") as file:

@@ -30,7 +30,7 @@ _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 
 def table_lines(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines of a table of rows, a column for each key with its head."""
+    """Yield the lines of a table of rows, with a column for each key."""
     return text_table([list(columns.values()), *cells(rows, columns)], text=0, repeat=2, least=10, gap=1)
 
 
@@ -40,7 +40,7 @@ def cells(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> list[list[s
 
 
 def print_json(value: Any, *, one_line: bool = False) -> None:
-    """Print a value as indented JSON, or on one line for a program that reads the output meanwhile."""
+    """Print a value as indented JSON, or on one line if a program reads the output at once."""
     text = json_text(value)
     text = " ".join(line.strip() for line in text.splitlines()) if one_line else text
     print(text, file=_for_json[-1] if _for_json else None, flush=one_line)
@@ -49,7 +49,7 @@ def print_json(value: Any, *, one_line: bool = False) -> None:
 def tell(
     options: argparse.Namespace, values: Any, lines: Iterable[str], files: Iterable[Path] = (), word: str = "figure"
 ) -> None:
-    """Print values as JSON with `--json`. Otherwise print lines, and a line for each written file."""
+    """Print values as JSON with `--json`, and otherwise as lines, with a line for each written file."""
     if options.json:
         print_json(values)
         return
@@ -110,13 +110,13 @@ def print_notes(notes: Iterable[str]) -> None:
 
 
 def entry(head: str, text: str, hanging: int = 2) -> str:
-    """Return a head and a text from any source in lines of 80 columns, with all lines but the first indented."""
+    """Wrap a heading and a message to 80 columns, with all lines but the first indented."""
     lines = textwrap.wrap(printable(text), COLUMNS, initial_indent=head, subsequent_indent=" " * hanging, **WHOLE)
     return "\n".join(lines) or head.rstrip()
 
 
 def printable(text: str) -> str:
-    """Return a text with escape sequences in place of control characters."""
+    """Replace the control characters of a string by escape sequences."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
@@ -140,7 +140,7 @@ _LINE_EVERY_S: Final = 10.0
 
 
 class Progress:
-    """Progress bar on a terminal, or lines in a log for counted runs."""
+    """Progress of counted runs: a bar on a terminal, lines in a log."""
 
     def __init__(self, label: str, *, quiet: bool) -> None:
         self._label, self._quiet = label, quiet
@@ -156,7 +156,7 @@ class Progress:
             print("\r" + " " * self._width + "\r", end="", file=sys.stderr, flush=True)
 
     def __call__(self, fraction: float, note: str = "") -> None:
-        """Show a fraction, 0 to 1, and a note."""
+        """Show a fraction from 0 to 1, and a note."""
         if self._bar:
             filled = round(_CELLS * fraction)
             line = f"{self._label} [{'#' * filled}{' ' * (_CELLS - filled)}] {fraction:4.0%} {note}"
@@ -164,7 +164,7 @@ class Progress:
             self._width = max(self._width, len(line))
 
     def count(self, runs: StudyProgress) -> None:
-        """Show number, rate and remaining time of many runs. A log gets a line every ten seconds."""
+        """Show number, rate and remaining time of many runs."""
         now_s = time.monotonic()
         rate = runs.here / max(now_s - self._begun_s, 1e-6)
         left_s = round((runs.total - runs.done) / rate) if rate > 0.0 else 0

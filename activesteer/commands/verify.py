@@ -98,7 +98,7 @@ def _driven(options: argparse.Namespace, folders: Mapping[str, Path]) -> dict[st
 
 
 def _scenarios(result: Reproduction) -> Iterator[str]:
-    """Yield the number of reproduced claims, by scenario and in all, with the texts of the other claims."""
+    """Yield the number of reproduced claims for each scenario and in total, with the other claims."""
     from activesteer.analysis.claims.judge import SCENARIO_OF
     from activesteer.analysis.claims.scorecard import Verdict
 

@@ -1,4 +1,4 @@
-"""TOML tables to frozen dataclasses: every key is known, every value has the right type and range.
+"""Conversion of TOML tables to frozen dataclasses, with checks of keys, types and ranges.
 
 The type of a field defines its check: `float`, `int`, `bool`, `str`, a `Literal` of words, a tuple of floats, a nested
 dataclass, a dict or a tuple of nested dataclasses, or one of these `| None`. An element of a tuple has its number as a
@@ -42,7 +42,7 @@ class Range(NamedTuple):
     high: float = MAX_NUMBER
 
     def __str__(self) -> str:
-        """Describe the range for an error message, without an end that is not set."""
+        """Describe the range for an error message."""
         if self.high > 0.1 * MAX_NUMBER:
             return f"at least {self.low:g}"
         if self.low < -0.1 * MAX_NUMBER:
@@ -75,7 +75,7 @@ class Source:
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def line_of(self, path: Sequence[str]) -> int | None:
-        """Return the line of a key in the text, which tomllib does not keep."""
+        """Return the line of a key in the file, because tomllib does not store it."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -97,7 +97,7 @@ class Source:
 
 
 def _numbered(name: str, elements: Mapping[str, int]) -> str:
-    """Return a dotted key, with the number of the current element after the name of each list."""
+    """Return a dotted key, with the current index after the name of each list."""
     key = ""
     for part in name.strip().split("."):
         key = f"{key}.{part}" if key else part
@@ -144,7 +144,7 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML, or any other text unchanged."""
+    """Parse a value as TOML, or return it unchanged if it is not valid TOML."""
     try:
         table = _parsed(f"value = {text}")
     except tomllib.TOMLDecodeError:
@@ -155,7 +155,7 @@ def parse_value(text: str) -> Any:
 
 
 def toml_value(value: Any) -> str:
-    """Return a value as TOML text, with texts, numbers and lists written as in JSON."""
+    """Return a value as a TOML string."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
@@ -164,7 +164,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """Return a table as the text of a file that `read_toml` reads, each inner table below its header.
+    """Return a table as a TOML file that `read_toml` reads, with inner tables below their headers.
 
     A list of tables is written in one line. Remarks are comments above the header of a table, by its dotted name.
     """
@@ -182,7 +182,7 @@ def _lines(table: Mapping[str, Any], remarks: Mapping[str, str], name: str) -> I
 
 
 def spellings(name: str) -> list[str]:
-    """Return the keys that fill a field (`class` for `class_`): its name, and the name in a display unit."""
+    """Return the keys that fill a field: its own name, and its name with a display unit."""
     name = name.removesuffix("_")
     edges = [name[: -len(si)] + edge for edge, (si, _) in EDGE_UNITS.items() if name.endswith(si)]
     return [name, *edges]
@@ -203,7 +203,7 @@ def field_in_unit(key: object, fields: Collection[str]) -> tuple[str | None, flo
 
 @functools.cache
 def hints_of(cls: type, *, include_extras: bool = False) -> dict[str, Any]:
-    """Return the types of the fields of a dataclass, cached: `typing.get_type_hints` parses them at every call."""
+    """Return the types of the fields of a dataclass. They are cached, because parsing them is slow."""
     return typing.get_type_hints(cls, include_extras=include_extras)
 
 
@@ -213,7 +213,7 @@ def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
 
 
 def dataclass_in(hint: Any) -> type | None:
-    """Return the dataclass of the table that a field holds, even if optional, or None for other fields."""
+    """Return the dataclass that a field holds, None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None
@@ -228,7 +228,7 @@ def element_of(hint: Any) -> type | None:
 
 @functools.cache
 def key_paths(cls: type, prefix: str = "") -> tuple[str, ...]:
-    """Return all dotted keys that a table for `cls` may have, cached because each override needs them."""
+    """Return all dotted keys that a table for `cls` may have. They are cached, because each override needs them."""
     paths: list[str] = []
     hints = hints_of(cls)
     for field in dataclasses.fields(cls):
@@ -256,7 +256,7 @@ def field_path(cls: type, path: Sequence[str]) -> tuple[str, ...]:
 
 
 def leaves(table: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
-    """Return all values of a table and of the tables in it, by the path of names to each."""
+    """Return all values of a table and its inner tables, by their paths."""
     found: dict[tuple[str, ...], Any] = {}
     for key, value in table.items():
         below = leaves(value) if isinstance(value, Mapping) else {(): value}
@@ -265,7 +265,7 @@ def leaves(table: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
 
 
 def key_hint(cls: type, key: str) -> str | None:
-    """Return the help that a class, or the class of an inner table, gives for a dotted key that does not exist."""
+    """Return the hint of a class for a dotted key that does not exist."""
     first, _, rest = key.partition(".")
     inner = dataclass_in(hints_of(cls).get(first)) if rest else None
     return getattr(cls, "KEY_HINTS", {}).get(key) if inner is None else key_hint(inner, rest)
@@ -345,12 +345,12 @@ def check_overruled(cls: type, table: Mapping[str, Any], source: Source, given: 
 
 
 def is_overruled(owner: Any, key: str) -> bool:
-    """Return whether other values of an object make one of its keys ineffective (see `OVERRULED`)."""
+    """Return whether other values of an object override one of its keys (see `OVERRULED`)."""
     return bool(_overruling(type(owner), key, vars(owner)))
 
 
 def _overruling(owner: type, key: str, values: Mapping[Any, Any]) -> Mapping[str, Any]:
-    """Return the rule that makes a key ineffective, or an empty one."""
+    """Return the rule that makes a key ineffective, empty without one."""
     rule = getattr(owner, "OVERRULED", {}).get(field_in_unit(key, fields_of(owner))[0], {})
     return rule if all(_holds(values[other], wanted) for other, wanted in rule.items()) else {}
 
@@ -471,7 +471,7 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
 
 
 def checked_number(key: str, value: object, limits: Range) -> float:
-    """Check the argument `key` of a Python function like a number in a file, and return it."""
+    """Check an argument of a Python function like a number in a file, and return it."""
     return _scalar(float, value, 1.0, limits, Source(""), (key,))
 
 
@@ -479,7 +479,7 @@ def check_points(
     key: str, points: Sequence[float], columns: Mapping[str, Sequence[float] | None], count: Range,
     error: type[ActiveSteerError] = ParameterError,
 ) -> None:  # fmt: skip
-    """Check that the points of a curve increase, are of an allowed number, and have columns of equal length."""
+    """Check that the points of a curve increase, are not too few or too many, and have columns of equal length."""
     if not count.low <= len(points) <= count.high:
         raise error(f"has {len(points)} points; allowed is {count}", key=key)
     for before, after in itertools.pairwise(points):
@@ -491,7 +491,7 @@ def check_points(
 
 
 def to_table(value: Any, *, defaults: bool = True) -> Any:
-    """Return a dataclass as plain tables for JSON that `build` reads."""
+    """Return a dataclass as plain tables that `build` reads."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         values = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
         return {

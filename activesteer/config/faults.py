@@ -1,4 +1,4 @@
-"""Faults of actuators and sensors as files and the command line declare them."""
+"""Faults of actuators and sensors, as declared in files and on the command line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Actuator(NamedTuple):
 
     @property
     def has_torque(self) -> bool:
-        """True for a brake or a motor, whose demand is a torque and which has only one stop."""
+        """True for a brake or a motor. Its demand is a torque, and it has only one stop."""
         return self.unit == "Nm"
 
 
@@ -138,7 +138,7 @@ class Fault:
 
     @property
     def _needed(self) -> str | None:
-        """Key that the kind of fault needs, or None."""
+        """Key that the kind of fault requires, or None."""
         if self.kind == "delayed":
             return "delay_s"
         if self.kind == "runaway" and self.part in ACTUATORS:
@@ -153,7 +153,7 @@ class Fault:
 
     @property
     def size(self) -> float:
-        """Size in the unit of the part, or 0 if the kind has none."""
+        """Size in the unit of the part, 0 if the kind has none."""
         return next((value for name in _SIZES if (value := getattr(self, name)) is not None), 0.0)
 
     @property
@@ -205,7 +205,7 @@ _WHEN: Final = "@START[-END]"
 
 
 def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
-    """Read a fault into the table that a manoeuvre file has, without checks of the table."""
+    """Parse a fault into a table of a manoeuvre file, without checks."""
     found = _FAULT.fullmatch(text.strip())
     if found is None or (found["start"] is None) is (start_s is None):
         if start_s is None:
@@ -225,7 +225,7 @@ def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
 
 
 def fault_words(fault: Mapping[str, Any]) -> str:
-    """Return a fault of a manoeuvre in SI units without its time, with its size in display units."""
+    """Return a fault as written for people: without its time, and with its size in display units."""
     said = f"{str(fault.get('part', '?')).replace('_', ' ')}: {fault.get('kind', '?')}"
     for key, value in fault.items():
         if key == "side" and value:
@@ -237,7 +237,7 @@ def fault_words(fault: Mapping[str, Any]) -> str:
 
 
 def fault_from(given: Any, now_s: float) -> Fault:
-    """Return a fault given during a run as an object or as text. By default it starts now."""
+    """Return a fault that is set during a run. By default it starts now."""
     if isinstance(given, str):
         table = fault_table(given, None if "@" in given else now_s)
         given = build(Fault, table, Source("", error=ManeuverError))

@@ -1,4 +1,4 @@
-"""Angles of superposition and rear wheels within their limits and rates, for a required yaw moment and side force.
+"""Allocation of a required yaw moment and side force to both steer angles, within their limits and rates.
 
 The state feedback of `lqr` wants the angles u_l without limits: a yaw moment M(u_l) and a side force F(u_l), by the
 slopes of the axle curves at the present slip angles. The angles minimise
@@ -168,7 +168,7 @@ def _relieved(
     angle_rad: tuple[float, float],
     ay_mps2: float,
 ) -> float:
-    """Return the superposition angle that relieves front wheels which turn the car more than required [rad]."""
+    """Return the superposition angle that unloads front wheels which turn the car too far [rad]."""
     front_slip_rad, rear_slip_rad, front, rear = axle_forces(
         block._curves, now, driver_rad + angle_rad[0], angle_rad[1]
     )
@@ -187,7 +187,7 @@ def _relieved(
 
 @shared
 def angle_range(place_rad: float, range_rad: tuple[float, float], reach_rad: float, works: bool) -> tuple[float, float]:
-    """Return least and greatest angle: range and rate, or the position of a failed actuator [rad]."""
+    """Return the smallest and the largest angle that limits, rate and faults allow [rad]."""
     if not works:
         return place_rad, place_rad
     least, most = range_rad

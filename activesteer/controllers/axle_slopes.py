@@ -74,7 +74,7 @@ class AxleSlopes(NativeBlock):
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
-    """Return the slip angles of an axle in excess of a straight curve, at lateral accelerations from 0 on [rad].
+    """Return the excess of an axle's slip angle over the linear one, at rising lateral accelerations [rad].
 
     `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
     """
@@ -130,7 +130,7 @@ def _slope(curve: Table, step_rad: float, slip_angle_rad: float, friction: float
 
 @shared
 def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, float]:
-    """Return the additional slip angles of a steady turn that the curvature of the axle curves requires.
+    """Return the additional slip angles that the nonlinear axles need in a steady turn.
 
     Args:
         block: The curves.
@@ -149,7 +149,7 @@ def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, f
 def axle_forces(
     block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float
 ) -> tuple[float, float, float, float]:
-    """Return slip angles of front and rear axle [rad], and their side forces per mass on the axle [m/s2].
+    """Return the slip angles of both axles [rad], and their side forces per mass on the axle [m/s2].
 
     Beyond the tabulated part a force keeps its last value, as a sliding tyre keeps most of its force.
     """
@@ -189,6 +189,6 @@ def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
 
 @shared
 def _between(values: Table, place: float) -> float:
-    """Interpolate in a row at a fractional index, and hold the last value beyond its end."""
+    """Interpolate in a row at a fractional index, constant beyond its end."""
     index = min(int(place), len(values) - 2)
     return values[index] + min(place - index, 1.0) * (values[index + 1] - values[index])

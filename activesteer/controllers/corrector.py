@@ -1,4 +1,4 @@
-"""Steer angle from the yaw rate error: desired yaw rate, tolerance function, PID, and direction of the angle."""
+"""Corrector for the yaw rate error: desired yaw rate, tolerance function, PID, and direction of the angle."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def rear_direction(error_radps: float) -> int:
 
 @shared
 def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
-    """Return an angle limited to either side [rad], and the side of the active limit: 1, -1, or 0 for none."""
+    """Limit an angle to either side [rad], and return the side of the active limit: 1, -1, or 0 for none."""
     if angle_rad > limit_rad:
         return limit_rad, 1
     if angle_rad < -limit_rad:
@@ -39,7 +39,7 @@ def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
 
 
 class Corrector(NativeBlock):
-    """PID on the yaw rate error behind the tolerance function.
+    """PID controller for the yaw rate error beyond the tolerance band.
 
     With the proportional gain alone it is the P corrector of the paper. The integral stops growing towards an active
     limit, and it fades with the tolerance function.
@@ -92,7 +92,7 @@ shared(tolerance)
 
 @shared
 def corrected(block: Corrector, error_radps: float, saturated: int) -> float:
-    """Law of `Corrector.step`: the angle of the corrector."""
+    """Law of `Corrector.step`."""
     activity = tolerance(error_radps, block._deadband_start_radps, block._deadband_end_radps)
     angle = block._proportional_gain_s * error_radps
     if block._integral_fraction:
@@ -108,7 +108,7 @@ def corrected(block: Corrector, error_radps: float, saturated: int) -> float:
 
 @shared
 def reset(block: Corrector) -> None:
-    """Law of `Corrector.reset`: clear integral and derivative."""
+    """Law of `Corrector.reset`."""
     block._integral_rad = 0.0
     block._filtered_radps = math.nan
 
@@ -118,7 +118,7 @@ MIN_SPEED_MPS: Final = 3.0
 
 
 class DesiredYawRate(NativeBlock):
-    """Desired yaw rate, eqs. 3 and 6, behind a first-order lag, exact for an input that is held between steps.
+    """Desired yaw rate (eqs. 3 and 6) behind a first-order lag, discretised exactly.
 
     Source: Dorsch 2012, section V.
     """

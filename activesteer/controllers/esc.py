@@ -1,4 +1,4 @@
-"""Electronic stability control by the brakes of single wheels, as defined by FMVSS 126.
+"""Electronic stability control with the brakes of single wheels (FMVSS 126).
 
 S4 of the standard requires brake torques at single wheels that make a yaw moment; yaw rate, sideslip and the driver's
 angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
@@ -24,7 +24,7 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 
 class Esc:
-    """Stability control by yaw moments of the brakes."""
+    """Stability control that creates yaw moments with the brakes."""
 
     interval_s = 0.005
     reads = ("esc", "estimator")
@@ -59,12 +59,12 @@ class Esc:
 
 
 def beyond(value: float, band: float) -> float:
-    """Return the part of a value beyond a band about 0."""
+    """Return the excess of a value beyond a dead band about 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 
 
 def stabilising(p: EscParameters, error_radps: float, sideslip_rad: float) -> float:
-    """Return M_z / J_z for a yaw rate error (desired minus actual) and a sideslip angle [rad/s2]."""
+    """Return the demanded yaw acceleration M_z / J_z for a yaw rate error and a sideslip angle [rad/s2]."""
     error = beyond(error_radps, p.yaw_rate_band_radps)
     slide = beyond(sideslip_rad, p.sideslip_limit_rad)
     return error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2

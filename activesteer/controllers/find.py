@@ -56,10 +56,10 @@ _MAX_PRESSURE_PA: Final = 1e8
 
 @dataclass(frozen=True)
 class _ControllerKind(Kind):
-    """Kind of block for controllers, where the torques of the wheels are four numbers in one field."""
+    """Kind of block for controllers. The four wheel torques form one field."""
 
     def completed(self, command: Any, name: str, setup: Any, said: str) -> ActuatorCommand:
-        """Return a command whose other fields are checked too."""
+        """Return a command after a check of its fields other than plain numbers."""
         for field in _OF_WHEELS:
             torques = getattr(command, field)
             if torques is NO_BRAKES or torques is NO_TORQUES:
@@ -130,17 +130,17 @@ def controller_spec(given: Any) -> Plugin:
 
 
 def is_variant(given: Any) -> bool:
-    """Return whether a controller is given as data: by the name of a variant, or by its file."""
+    """Return whether a controller is given as data: a variant's name or file."""
     return CONTROLLER.is_data(given)
 
 
 def system_of(given: str) -> str:
-    """Return the registered controller behind the name of a variant, or another name unchanged."""
+    """Return the registered controller of a variant, or any other name unchanged."""
     return read_variant(given).system if is_variant(given) else given
 
 
 def keys_read(given: Any) -> frozenset[str]:
-    """Return the keys of the table [controllers] that a controller and its control unit read.
+    """Return the keys of the table [controllers] that affect a controller and its control unit.
 
     A user's own code may read all of them.
 
@@ -154,7 +154,7 @@ def keys_read(given: Any) -> frozenset[str]:
 
 
 def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
-    """Return default, unit, range and type of each parameter of a controller that overrides can set, by key.
+    """Return the parameters of a controller by key, each with default, unit, range and type.
 
     Args:
         given: See `controller_spec`.

@@ -23,7 +23,7 @@ from activesteer.theory.single_track import SingleTrack
 
 
 class FrontSuperposition(NativeBlock):
-    """Active front steering (AFS): the corrector of the rear steering with the opposite sign, without prediction."""
+    """Active front steering (AFS): the corrector of the rear steering with opposite sign, and no prediction."""
 
     reads = ("afs", "desired_yaw_rate")
     rates_radps = MappingProxyType({"superposition": math.radians(13.0)})
@@ -50,7 +50,7 @@ class FrontSuperposition(NativeBlock):
 def front_superposition(
     block: FrontSuperposition, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `FrontSuperposition.step`, which returns the first fields of an `ActuatorCommand`."""
+    """Law of `FrontSuperposition.step`, for the first fields of an `ActuatorCommand`."""
     speed_mps = measurement.speed_mps
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:

@@ -1,4 +1,4 @@
-"""One controller for rear steering, front superposition and brakes: steering first, then the brakes.
+"""Integrated control of rear steering, front superposition and brakes, with priority for the steering.
 
 The angles are those of `lqr` with its allocation, within their limits and rates (`controllers/allocation.py`). The law
 of `esc` gives the yaw moment that the car needs to stay under control, beyond its bands:
@@ -69,7 +69,7 @@ then the bounds of A x."""
 
 
 def solver() -> Solve:
-    """Return the dual active-set method of DAQP, with a cold start in every call so that it has no state.
+    """Return the dual active-set method of DAQP. Every call starts cold, so the solver has no state.
 
     Raises:
         ControllerError: DAQP is not installed.
@@ -89,7 +89,7 @@ def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: A
 
 
 class SupervisedActuator:
-    """An actuator that must approach its demand.
+    """Monitor of an actuator that must approach its demand.
 
     An actuator is suspected if all demands of a window were on the same side of its position, by more than a tolerance,
     and it has not moved there by a tenth of the least distance. It counts as failed, until the end of the run, once it
@@ -138,7 +138,7 @@ _KILO = 1e3
 
 
 class Integrated:
-    """State feedback, with allocation of its corrections to steering and brakes."""
+    """State feedback whose corrections are allocated to steering and brakes."""
 
     interval_s = 0.005
     reads = (*Lqr.reads, "integrated", "esc", "tv")
@@ -238,7 +238,7 @@ class Integrated:
         )
 
     def _missing_moment(self, now: Estimate, driver_rad: float, ay_mps2: float, steered_Nm: float) -> float:
-        """Return the part of the stability demand that the steering cannot provide within the time ahead [Nm]."""
+        """Return the yaw moment demand that the steering cannot provide within the horizon [Nm]."""
         borne = self._borne.borne(driver_rad, now.speed_mps, now.friction, ay_mps2)
         if now.speed_mps < self._stability.least_speed_mps:
             return 0.0
@@ -253,7 +253,7 @@ class Integrated:
     def _side_difference(
         self, turn: Turn, at_rad: tuple[float, float], works: tuple[bool, bool], shares: tuple[float, float]
     ) -> float:
-        """Return the allowed pressure difference between the sides for the remaining angles and slopes [Pa]."""
+        """Return the allowed pressure difference between the sides [Pa]."""
         p, car, now = self._parameters, self._car, turn.estimate
         front, rear = (self._limits_rad[axle] - abs(at_rad[axle]) if works[axle] else 0.0 for axle in (0, 1))
         force_N = min(shares[0] * car.front_stiffness_Nprad * front, shares[1] * car.rear_stiffness_Nprad * rear)

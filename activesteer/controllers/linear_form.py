@@ -1,4 +1,4 @@
-"""A controller as a linear system about driving straight: by its equations, or by its frequency response.
+"""Linear form of a controller about straight driving, from its equations or its frequency response.
 
 A controller gets the measurements of a car that drives straight ahead until it has settled, and then a small pulse in
 one of them. The difference to its answer without the pulse is its impulse response. The Fourier sum of that is its
@@ -190,7 +190,7 @@ def _answers(
     height: float = 0.0,
     calls: int = 1,
 ) -> Array:
-    """Return the commands of `count` calls, shape (count, len(COMMANDS)), the first `calls` of them with a pulse."""
+    """Return the commands of `count` calls, shape (count, commands). The first `calls` of them receive a pulse."""
     straight = DriverCommand(front_steer_demand_rad=0.0)
     commands = np.empty((count, len(COMMANDS)))
     for call in range(count):

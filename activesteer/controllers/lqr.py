@@ -1,4 +1,4 @@
-"""Front and rear wheels together: a linear-quadratic regulator about the turn that the driver demands.
+"""Linear-quadratic regulator of front and rear wheels about the turn that the driver demands.
 
 The model is the single-track model (eqs. 1 and 2), with tyres that lag by their relaxation length s and actuators that
 lag by T_a, whose commands take effect one call later:
@@ -101,7 +101,7 @@ _FULL_MPS: Final = 8.0
 
 
 class Turn(NamedTuple):
-    """The desired turn and the angles for it: superposition and rear angle.
+    """Desired turn, with its superposition and rear angle.
 
     Attributes:
         estimate: Estimate of the motion.
@@ -210,7 +210,7 @@ class Lqr(NativeBlock):
         works: tuple[bool, bool] = BOTH,
         own_brakes_Nm: PerWheel = NO_BRAKES,
     ) -> Turn:
-        """Return the desired turn and the demands of the state feedback, all zero below walking speed.
+        """Return the desired turn and the feedback demands, which are zero below walking speed.
 
         `works` says whether superposition and rear steering work, `own_brakes_Nm` the brake torques that the controller
         itself demands.
@@ -234,7 +234,7 @@ class Lqr(NativeBlock):
     def allocate(
         self, turn: Turn, command: DriverCommand, measurement: Measurement, works: tuple[bool, bool]
     ) -> tuple[float, float, float]:
-        """Return superposition and rear angle within their limits [rad], and the change of moment by them [Nm]."""
+        """Return the limited superposition and rear angle [rad], and the moment change that they cause."""
         now, driver_rad = turn.estimate, command.front_steer_demand_rad
         at_rad = measurement.superposition_rad, measurement.rear_steer_rad
         angles_rad = allocated(
@@ -259,7 +259,7 @@ def regulated(
     rear_rad: float,
     pressures_Pa: PerWheel,
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `Lqr.step`, which returns the first fields of an `ActuatorCommand`."""
+    """Law of `Lqr.step`, for the first fields of an `ActuatorCommand`."""
     desired, _, _, steady, front_demand, rear_demand, least, most = fed_back(
         block, now, innovation, driver_rad, brake_pedal, superposition_rad, rear_rad, pressures_Pa, NO_BRAKES
     )
@@ -290,7 +290,7 @@ def fed_back(
     pressures_Pa: PerWheel,
     own_brakes_Nm: PerWheel,
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Law of `Lqr.turn`, which returns the fields of `Turn` after the estimate in their order."""
+    """Law of `Lqr.turn`, with the estimate and then the fields of `Turn`."""
     speed, friction = now[_SPEED], now[_FRICTION]
     certain, authority = confidence(block._confidence, innovation, now[_FRICTION_STD])
     if speed < MIN_SPEED_MPS:
@@ -367,7 +367,7 @@ def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
 
 @shared
 def _patience(block: Lqr, driver_rad: float) -> float:
-    """Return the part of the superposition that may still be held against the driver.
+    """Return the fraction of the superposition that may still act against the driver.
 
     It counts the time of a superposition against a driver whose angle is not below its own lagged value. A driver who
     has steered to the other side begins anew.
@@ -393,7 +393,7 @@ def _steady(
     yaw_rate_radps: float,
     understeer_s2radpm: float,
 ) -> tuple[float, float, float]:
-    """Return front angle, rear angle and sideslip of a steady turn, from their gains in the schedule [rad]."""
+    """Return front angle, rear angle and sideslip angle of a steady turn from the gain schedule [rad]."""
     ay_mps2 = speed_mps * yaw_rate_radps
     front_more, rear_more = excess(block._curves, ay_mps2, friction)
     front_more += understeer_s2radpm * ay_mps2
@@ -408,7 +408,7 @@ def _steady(
 
 @shared
 def _place(speed_mps: float) -> tuple[int, float]:
-    """Return the start of the schedule row before a speed, and the fraction of the way to the next row."""
+    """Return the index of the schedule row below a speed, and the fraction of the way to the next row."""
     place = min(max(speed_mps / SPEED_STEP_MPS - 1.0, 0.0), len(SPEEDS_MPS) - 1 - 1e-6)
     return _ROW * int(place), place - int(place)
 
@@ -445,7 +445,7 @@ def schedule(
 def steady_turn(
     car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH, *, in_phase: bool = False
 ) -> Array:
-    """Return front angle, rear angle and sideslip of a steady turn, which both actuators drive without sideslip.
+    """Return the gains of a steady turn without sideslip: front angle, rear angle and sideslip angle.
 
     Args:
         car: The known car.
@@ -475,7 +475,7 @@ def steady_turn(
 def model(
     car: SingleTrackParameters, parameters: LqrParameters, servo_lag_s: float, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
-    """Return the model from one call to the next, for constant inputs.
+    """Return the discrete-time model over one call, for constant inputs.
 
     Returns:
         System matrix, shape (8, 8) over `STATES`; input matrix, shape (8, 2), inputs superposition and rear angle.
@@ -502,7 +502,7 @@ def feedback(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> Array:
-    """Return K at a speed, shape (2, 8): superposition and rear angle per deviation of `STATES`, or 0 if failed."""
+    """Return the feedback gains of both actuators at a speed, shape (2, 8), with a zero row for a failed one."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
     a, b = model(car, parameters, servo_lag_s, speed_mps, interval_s)

@@ -34,7 +34,7 @@ _memory_pointer: Final = pointer_to(from_dtype(MEMORY))
 
 @compiled_call(types.void, *CALL)
 def lqr(block_address, command, measurement, held_address):
-    """Write what `Lqr.step` returns, with the arguments of `native_memory.CALL`."""
+    """Write the result of `Lqr.step`, with the arguments of `native_memory.CALL`."""
     block = carray(_block_pointer(block_address), (1,))[0]
     parts = block._estimator
     memory = carray(_memory_pointer(parts._memory.address), (1,))

@@ -1,4 +1,4 @@
-"""Controllers that command nothing: no control, and an observer that records the estimate."""
+"""Controllers without actuator commands: no control, and an observer that records the estimate."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class NoControl(NativeBlock):
 def no_control(
     block: NoControl, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `NoControl.step`, which returns the first fields of an `ActuatorCommand`."""
+    """Law of `NoControl.step`, for the first fields of an `ActuatorCommand`."""
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, measurement.speed_mps)
     return 0.0, 0.0, desired, 0.0, 0.0, False
 

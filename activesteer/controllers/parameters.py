@@ -1,4 +1,4 @@
-"""Types and ranges of the controllers' gains and limits, with values in `models/controllers` and vehicle files."""
+"""Types and ranges of the gains and limits of all controllers."""
 
 from __future__ import annotations
 
@@ -318,7 +318,7 @@ class ControllerSetup:
     battery_power_W: tuple[float, float] = (math.inf, math.inf)
 
     def estimator(self) -> Estimator:
-        """Create an estimator of speed, sideslip, yaw rate and friction, to be called in each step of the controller.
+        """Create an estimator, to be called in each step of the controller.
 
         Raises:
             ControllerError: the vehicle file lacks the table [two_track].

@@ -30,7 +30,7 @@ from activesteer.theory.single_track import SingleTrack, rear_prediction
 
 
 class RearPrediction(NativeBlock):
-    """The transfer function G(s) of eq. 5 in the time domain, with coefficients of the current speed.
+    """Transfer function G(s) of eq. 5 in the time domain, with coefficients for the current speed.
 
     State form: T_1 dx/dt = delta_V - x, delta_H = K_H x + K_H T_z dx/dt; exact for an input held between steps.
     """
@@ -104,7 +104,7 @@ class RearSteer(NativeBlock):
 def rear_steer(
     block: RearSteer, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `RearSteer.step`, which returns the first fields of an `ActuatorCommand`."""
+    """Law of `RearSteer.step`, for the first fields of an `ActuatorCommand`."""
     front_steer_rad, speed_mps = command.front_steer_demand_rad, measurement.speed_mps
     desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:

@@ -68,13 +68,13 @@ class Range(NamedTuple):
     most_Nm: float
 
     def largest_Nm(self, side: float) -> float:
-        """Return the largest difference towards a side, 1 left or -1 right [Nm]."""
+        """Return the largest torque difference towards a side, 1 left or -1 right [Nm]."""
         (low_left, low_right), (high_left, high_right) = self.low, self.high
         wide = high_right - low_left if side > 0.0 else high_left - low_right
         return min(max(wide, 0.0), self.most_Nm)
 
     def torques(self, difference_Nm: float) -> tuple[float, float]:
-        """Return the added torques of left and right wheel, with a sum of 0 unless one of them is at its limit."""
+        """Return the torques to add at left and right wheel. Their sum is 0 unless one of them is at its limit."""
         half = 0.5 * difference_Nm
         left = min(max(-half, self.low[0]), self.high[0])
         right = min(max(difference_Nm + left, self.low[1]), self.high[1])
@@ -82,12 +82,12 @@ class Range(NamedTuple):
 
 
 def _left_by(slip: float) -> float:
-    """Return the fraction of a torque that remains for a wheel that already slips in the torque's direction."""
+    """Return the fraction of a torque that traction leaves for a wheel slipping in the torque's direction."""
     return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
 
 
 class SplitTorques:
-    """Electric axles of a car as a controller knows them."""
+    """Electric axles of a car, as known to a controller."""
 
     def __init__(self, setup: ControllerSetup) -> None:
         """Compute the constants."""
@@ -106,7 +106,7 @@ class SplitTorques:
         self._levers = [0.5 * track_m / self._radius_m[2 * axle] for axle, track_m in enumerate(tracks_m)]
 
     def ranges(self, command: DriverCommand, measurement: Measurement, now: Estimate) -> list[Range]:
-        """Return the ranges of the electric axles for the current motion, after the driver's torque."""
+        """Return the torque differences that each electric axle can still create on top of the driver's torque."""
         if not self._axles:
             return []
         if command.brake_pedal > 0.0:
@@ -141,7 +141,7 @@ class SplitTorques:
     def for_moment(
         self, moment_Nm: float, command: DriverCommand, measurement: Measurement, now: Estimate
     ) -> tuple[PerWheel, float]:
-        """Return the torques to add at the wheels for a yaw moment, left positive, and the moment that they create."""
+        """Return the wheel torques to add for a yaw moment, left positive, and the moment that they create."""
         ranges, side = self.ranges(command, measurement, now), math.copysign(1.0, moment_Nm)
         possible = sum(each.lever * each.largest_Nm(side) for each in ranges)
         if possible <= 0.0 or moment_Nm == 0.0:
@@ -154,7 +154,7 @@ class SplitTorques:
     def of_differences(
         self, differences_Nm: Sequence[float], ranges: Sequence[Range], command: DriverCommand, measurement: Measurement
     ) -> PerWheel:
-        """Return the torques to add at the wheels for differences of the axles, within the limits of the battery."""
+        """Return the wheel torques to add for the axles' torque differences, within the limits of the battery."""
         if not any(differences_Nm):
             return NO_TORQUES
         torques = [0.0, 0.0, 0.0, 0.0]
@@ -182,7 +182,7 @@ class SplitTorques:
 
 
 class TorqueVectoring:
-    """Yaw moments by left and right torques of electric axles."""
+    """Torque vectoring between the left and right wheels of electric axles."""
 
     interval_s = 0.005
     reads = ("tv", "estimator")

@@ -1,4 +1,4 @@
-"""The desired turn, limited by the friction, and the confidence in the estimator that it needs."""
+"""The desired turn, limited by the friction, and a monitor of the estimator that provides the friction."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, 
 
 
 class TurnReference(NativeBlock):
-    """Desired yaw rate, eqs. 3 and 6 with the estimated friction, behind a first-order lag of the driver's angle.
+    """Desired yaw rate (eqs. 3 and 6) with the estimated friction, behind a first-order lag.
 
     The lag is a distance, like the lag of the tyres: at twice the speed the car answers in half the time.
     """
@@ -30,7 +30,7 @@ class TurnReference(NativeBlock):
     def __init__(
         self, single_track: SingleTrackParameters, length_m: float, friction_fraction: float, interval_s: float
     ) -> None:
-        """Compute the constants from the distance over which the yaw rate follows the driver, `length_m`."""
+        """Compute the constants, with `length_m` as the distance over which the yaw rate follows the driver."""
         self._single_track = SingleTrack(single_track)
         self._length_m, self._interval_s = length_m, interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
@@ -65,7 +65,7 @@ def _desired(block: TurnReference, angle_rad: float) -> float:
 
 
 class BorneTurnReference(TurnReference):
-    """Desired yaw rate that falls if the measured lateral acceleration is less than the turn requires.
+    """Desired yaw rate that falls if the measured lateral acceleration is too small for it.
 
     A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
     measured |a_y| is short of v |r*| by more than D, the desired yaw rate r* falls by the rest over v, at most to zero.

@@ -1,4 +1,4 @@
-"""A child process for foreign native code, which may crash, hang or return invalid data without harm to this process.
+"""A child process for foreign native code. It may crash, hang or return invalid data without harm to this process.
 
 This file imports nothing of the package: run as a program, it is the child process.
 """
@@ -29,11 +29,11 @@ _PIECE_BYTES: Final = 1 << 20
 
 
 class ChildFault(Exception):  # noqa: N818 - a fault of the child
-    """A child process crashed, hung or returned invalid data. The message says which."""
+    """Failure of a child process: it crashed, hung or returned invalid data. The message gives the reason."""
 
 
 class Child:
-    """A child process with time limits for its answers, and its process group, which ends with it."""
+    """A child process whose answers have a time limit, and which ends together with its process group."""
 
     def __init__(self, file: str, max_memory_bytes: int | None = None, *, quiet: bool = False) -> None:
         """Start the process."""
@@ -54,7 +54,7 @@ class Child:
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:
-        """Return the answer to a request, or kill the child if there is none."""
+        """Return the answer to a request. If there is none, kill the child and raise."""
         if not self.alive:
             raise ChildFault(f"has ended, before {doing}")
         try:
@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return the reason for a missing answer, or None for an exception that is not the child's."""
+        """Return the reason for a missing answer, None for an exception of another origin."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)

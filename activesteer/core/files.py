@@ -30,12 +30,12 @@ def shown_path(path: str | os.PathLike[str]) -> str:
 
 
 def writing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Context that turns an OSError of writing into an error of class `error`."""
+    """Context that converts an OSError of writing into an error of class `error`."""
     return _refused("write", path, error)
 
 
 def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Context that turns an OSError of reading into an error of class `error`."""
+    """Context that converts an OSError of reading into an error of class `error`."""
     return _refused("read", path, error)
 
 
@@ -67,14 +67,14 @@ def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) ->
 
 
 def delete_temporary_files() -> None:
-    """Delete all temporary files of `atomic_write`, before the process ends without unwinding."""
+    """Delete all temporary files of `atomic_write`, for a process that ends without unwinding."""
     for part in tuple(_passing):
         with suppress(OSError):
             part.unlink(missing_ok=True)
 
 
 def write_text(path: str | os.PathLike[str], text: str, error: type[ActiveSteerError]) -> Path:
-    """Write a text file in UTF-8, in place of an existing file, and return its path."""
+    """Write a UTF-8 text file, which replaces an existing one, and return its path."""
     with atomic_write(path, error) as part:
         part.write_text(text, encoding="utf-8")
     return Path(path)
@@ -101,7 +101,7 @@ def finite(value: Any) -> Any:
 
 
 def file_word(text: str) -> str:
-    """Return a text as part of a file name: only letters, digits, dots, hyphens and underscores."""
+    """Return a string for a file name: only letters, digits, dots, hyphens and underscores."""
     return "".join(letter if letter.isalnum() or letter in "._-" else "_" for letter in text)
 
 
@@ -114,7 +114,7 @@ def user_path(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Pa
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Return whether a path is a regular file, False for names that no file can have."""
+    """Return whether a path is a regular file, False for impossible names."""
     try:
         return stat.S_ISREG(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -122,7 +122,7 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 
 
 def is_folder(path: str | os.PathLike[str]) -> bool:
-    """Return whether a path is a folder, False for names that no folder can have."""
+    """Return whether a path is a folder, False for impossible names."""
     try:
         return stat.S_ISDIR(os.stat(path).st_mode)
     except (OSError, ValueError):

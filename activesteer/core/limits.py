@@ -111,7 +111,7 @@ def check_number(value: float, error: type[ActiveSteerError], *, text: Any = Non
 
 
 def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
-    """Return the number in a text (see `check_number`)."""
+    """Parse a number (see `check_number`)."""
     try:
         value = float(text)
     except ValueError:
@@ -121,7 +121,7 @@ def number_in(text: str, error: type[ActiveSteerError], **place: Any) -> float:
 
 
 def too_large(values: Any, *, infinite: bool = False) -> Any:
-    """Return the mask of the values above `MAX_NUMBER`, or only of the finite ones if `infinite`."""
+    """Return the mask of the values above `MAX_NUMBER`."""
     # A nan is a missing value, and a run that diverged may hold infinity.
     size = abs(values)
     return (size > MAX_NUMBER) & (size < math.inf) if infinite else size > MAX_NUMBER
@@ -139,7 +139,7 @@ LIMIT_M: Final = 1e6
 
 
 def fail(key: str, problem: str) -> RecordingError:
-    """Return an error that names the place in the metadata."""
+    """Return an error that gives the key in the metadata."""
     return RecordingError(problem, file="the metadata", key=key)
 
 
@@ -168,7 +168,7 @@ def number(value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M
 def numbers(
     value: object, key: str, low: float = -LIMIT_M, high: float = LIMIT_M, count: int | None = None
 ) -> NDArray[np.float64]:
-    """Return the value [m] if it is a list of numbers from `low` to `high`, `count` of them if given, or raise."""
+    """Return the value [m] if it is a list of `count` numbers from `low` to `high`, or raise an error."""
     import numpy as np  # noqa: PLC0415 - slow to import
 
     listed = sequence(value, key)
@@ -178,7 +178,7 @@ def numbers(
 
 
 def text(value: object, key: str) -> str:
-    """Return the value if it is a text, or raise an error."""
+    """Return the value if it is a string, or raise an error."""
     if not isinstance(value, str):
         raise fail(key, f"is {shown(value)}, expected a text")
     return value

@@ -53,7 +53,7 @@ class Better(StrEnum):
 
 
 class Form(StrEnum):
-    """Written form of a metric's value."""
+    """Kind of a metric's value, for its format."""
 
     NUMBER = "number"
     COUNT = "count"
@@ -87,7 +87,7 @@ class Metric(NamedTuple):
         return self.form is not Form.NUMBER
 
     def text(self, value: float) -> str:
-        """Return a value [SI] in the form of the tables, with `-` for nan."""
+        """Format a value [SI] for a table, with `-` for nan."""
         if math.isnan(value):
             return "-"
         if self.form is Form.YES_OR_NO:
@@ -95,7 +95,7 @@ class Metric(NamedTuple):
         return f"{value:z.0f}" if self.form is Form.COUNT else f"{value * self.unit.factor:z.3f}"
 
     def cost(self, value: float) -> float:
-        """Return the quantity to minimise [SI], or the value itself if the metric has no preferred direction."""
+        """Return a cost to minimise [SI], or the value itself without a preferred direction."""
         if self.better is Better.SMALLER:
             return abs(value)
         return -value if self.better is Better.HIGHER else value
@@ -174,7 +174,7 @@ def _declare(
     unit: DisplayUnit | None = None,
     form: Form = Form.NUMBER,
 ) -> list[Metric]:
-    """Return metrics of one unit, by their names without it."""
+    """Return metrics of one unit, with names given without the unit."""
     names = {stem: f"{stem}_{si}" if si else stem for stem in stems}
     shown = unit or display_unit(f"_{si}")
     return [Metric(name, _label(stem), shown, significance, better, form) for stem, name in names.items()]
@@ -299,7 +299,7 @@ def metric(name: str) -> Metric:
 
 
 def recorded_metric(name: str) -> Metric:
-    """Return a metric that a file names.
+    """Return a metric of a recording, declared or not.
 
     A file of another version may hold a metric that this version does not declare. Such a metric is shown by its full
     name, which says its SI unit, and its value is not converted.

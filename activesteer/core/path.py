@@ -95,6 +95,6 @@ class Path:
 
 
 def _first(wrong: Sequence[bool] | NDArray[np.bool_]) -> int:
-    """Return the number of the first wrong point, counted from 1, or 0 if there is none."""
+    """Return the number of the first invalid point, counted from 1, or 0."""
     found = np.flatnonzero(wrong)
     return int(found[0]) + 1 if found.size else 0

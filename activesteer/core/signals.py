@@ -55,7 +55,7 @@ class Channel(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """Annotation of a field of a message that is recorded.
+    """Annotation of a recorded field of a message.
 
     Attributes:
         unit: Unit of its channel.
@@ -105,28 +105,28 @@ def numbers_of(message: type[tuple[Any, ...]]) -> tuple[Number, ...]:
 
 @functools.cache
 def widths_of(message: type[tuple[Any, ...]]) -> tuple[int, ...]:
-    """Return how many numbers each field of a message holds (see `numbers_of`)."""
+    """Return the count of numbers in each field of a message (see `numbers_of`)."""
     fields = [number.field for number in numbers_of(message)]
     return tuple(fields.count(field) for field in get_type_hints(message))
 
 
 @functools.cache
 def record_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """Return the fields of a record of float64 with the numbers of a message, by the names of its fields."""
+    """Return the fields of a float64 record for the numbers of a message."""
     widths = zip(get_type_hints(message), widths_of(message), strict=True)
     return [(name, "f8") if width == 1 else (name, "f8", (width,)) for name, width in widths if width]
 
 
 @functools.cache
 def nested_fields(message: type[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
-    """Return the fields of `record_fields`, with a record of four numbers for the wheels."""
+    """Return the fields of `record_fields`, where the wheels form a record of four numbers."""
     widths = zip(get_type_hints(message), widths_of(message), strict=True)
     wheels = [(corner, "f8") for corner in CORNERS]
     return [(name, "f8" if width == 1 else wheels) for name, width in widths if width]
 
 
 def numbers_in(message: tuple[Any, ...]) -> list[float]:
-    """Return the numbers of a message one after the other (see `numbers_of`)."""
+    """Return all numbers of a message as a flat list (see `numbers_of`)."""
     row: list[float] = []
     for width, value in zip(widths_of(type(message)), message, strict=True):
         if width == 1:
@@ -242,7 +242,7 @@ class DriverCommand(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """Signals of the sensors of a real car.
+    """Signals of a real car's sensors.
 
     The field of a sensor has the name of the sensor in a vehicle file, followed by the unit.
 
@@ -294,7 +294,7 @@ class Motion(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Motion of the centre of gravity over the road as an estimator derives it from the sensors.
+    """Motion of the centre of gravity over the road, as estimated from the sensors.
 
     A standard deviation is that of the error which the estimator itself expects.
 
@@ -383,5 +383,5 @@ class ActuatorCommand(NamedTuple):
 def steering(
     first: tuple[float, float, float, float, float, bool], estimate: Estimate | None = None
 ) -> ActuatorCommand:
-    """Return the `ActuatorCommand` of a controller that only steers, from its first six fields and its estimate."""
+    """Return the `ActuatorCommand` of a steering controller, from its first six fields and its estimate."""
     return new_message(ActuatorCommand, (*first, NO_BRAKES, 0.0, estimate, 0.0, NO_TORQUES))

@@ -60,7 +60,7 @@ def text_table(
 
 
 def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
-    """Split a line into parts that fit. Further parts are indented by four more columns."""
+    """Split a line into pieces that fit, with all but the first indented by four more columns."""
     if _length(line) <= width:
         return [line]
     indent = " " * (len(line) - len(line.lstrip()) + 4)
@@ -94,5 +94,5 @@ def _lines(rows: Rows, widths: Sequence[int], text: int, gap: int, marks: Sequen
 
 
 def unsigned_zeros(text: str) -> str:
-    """Return a text of numbers without the minus sign of a zero."""
+    """Remove the minus sign of zeros in a string."""
     return _NEGATIVE_ZERO.sub("", text)

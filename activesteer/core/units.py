@@ -26,7 +26,7 @@ class Unit(NamedTuple):
 
 
 class DisplayUnit(NamedTuple):
-    """Unit for display: its name, `-` for a pure number, and the factor from the SI value."""
+    """Display unit: its name, `-` for a pure number, and the factor from the SI value."""
 
     name: str
     factor: float
@@ -140,7 +140,7 @@ def split_ending(name: str) -> tuple[str, Unit]:
 
 
 def unit_of(name: str) -> str:
-    """Return the name of the unit at the end of a name, or empty for a pure number."""
+    """Return the unit at the end of a name, empty for a pure number."""
     return split_ending(name)[1].name
 
 
@@ -166,12 +166,12 @@ class Quantity(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Label and unit, the title of a plot."""
+        """Label and unit, for a plot title."""
         return f"{self.label[0].upper()}{self.label[1:]} [{self.unit.name}]"
 
     @property
     def axis_title(self) -> str:
-        """Short label and unit in two lines, the title of an axis."""
+        """Short label and unit in two lines, for an axis title."""
         return f"{self.short}\n[{self.unit.name}]"
 
     def value_text(self, value: float) -> str:
@@ -214,12 +214,12 @@ _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """Return a text of numbers for a page, with minus signs, without a minus before zero, and with m/s²."""
+    """Typeset numbers in a string: minus signs, no minus before zero, and m/s²."""
     return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
 
 
 def three_digits(value: float) -> str:
-    """Return a number with three digits, or as a whole number from 100 on, typeset."""
+    """Typeset a number with three digits."""
     return typeset(f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}")
 
 

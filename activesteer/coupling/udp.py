@@ -30,7 +30,7 @@ _MOST_WAITING: Final = 1000
 
 
 class UdpPort(NamedTuple):
-    """Address from which commands come.
+    """Address that receives commands.
 
     Attributes:
         port: Port of the run.
@@ -109,7 +109,7 @@ class UdpLink:
         return self._socket.getsockname()
 
     def connect(self, check: Callable[[Commands, str], Commands]) -> None:
-        """Accept commands that pass this check."""
+        """Register a function that checks commands."""
         self._check = check
 
     def close(self) -> None:
@@ -117,7 +117,7 @@ class UdpLink:
         self._socket.close()
 
     def commands(self) -> Commands:
-        """Read what has arrived, and return the commands for the next step.
+        """Read all waiting messages, and return the commands for the next step.
 
         Raises:
             ManeuverError: there was no command for too long, and the reaction is `stop`.

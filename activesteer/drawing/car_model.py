@@ -1,4 +1,4 @@
-"""Appearance of a car from its model in the engine: solids, links, springs and dampers."""
+"""Appearance of a car, from its model: solids, links, springs and dampers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _KINDS: Final = {
 
 
 def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
-    """Return the solids of a car in the frames of their bodies, and the links, springs and dampers between bodies."""
+    """Return the drawable parts of a car: solids in the frames of their bodies, and links between bodies."""
     return (*primitives_of(model), *links_of(model))
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
-    """Return the visible geoms of all bodies except the world as simple solids, in the frames of their bodies.
+    """Return the visible geoms as solids, in the frames of their bodies.
 
     A capsule becomes a cylinder of the same length; meshes and planes are left out.
     """

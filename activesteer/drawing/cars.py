@@ -35,7 +35,7 @@ def shares_of(colour: str) -> tuple[float, float, float]:
 
 
 def height_colours(heights_m: Array) -> NDArray[np.uint8]:
-    """Return colours of heights, shape (n, 3): asphalt at 0, lighter and warmer above, darker and bluer below.
+    """Return the colours of heights: grey at 0, lighter above, darker below.
 
     The scale ends at the largest height, at least 20 mm.
     """
@@ -50,7 +50,7 @@ _SEEN_M: Final = 1.0
 
 
 def share_seen(apart_m: Array | float) -> Array:
-    """Return the fraction of a ghost's opacity: it fades between 1 m and 0.2 m from the car and vanishes below.
+    """Return the opacity factor of a ghost, which fades out between 1 m and 0.2 m from the car.
 
     Two surfaces in one place would show through each other in patches.
     """
@@ -65,7 +65,7 @@ motion, which therefore stays visible."""
 
 
 def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> Array:
-    """Return the averaged, continuous direction of motion over the ground [rad], left positive, shape (k,)."""
+    """Return the smoothed, continuous direction of motion over the ground [rad], left positive, shape (k,)."""
     if len(time_s) < 2:
         return np.unwrap(heading_rad)
     velocity = np.asarray(np.gradient(places_m, time_s, axis=0))
@@ -78,7 +78,7 @@ def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> A
 
 
 def _smooth(time_s: Array, values: Array) -> Array:
-    """Return a moving average with Gaussian weights and no phase shift, with the end values continued."""
+    """Return a zero-phase Gaussian moving average, with the end values continued."""
     step = float(np.median(np.diff(time_s)))
     reach = round(4.0 * _STEADY_S / step)
     offsets = np.arange(-reach, reach + 1) * step
@@ -122,14 +122,14 @@ class BodySurface(NamedTuple):
 
     @property
     def shell(self) -> bool:
-        """True if the surface belongs to the body, which hides the parts below it, and not to a wheel."""
+        """True for a surface of the body, False for a wheel."""
         return not self.body.endswith("_wheel")
 
 
 def dressed(
     parts: Sequence[ScenePart], size: Footprint | None
 ) -> tuple[tuple[ScenePart, ...], tuple[BodySurface, ...]]:
-    """Return the parts of a car and, if its size is known, the surfaces of its body and wheels."""
+    """Return the solids of a car and, if its size is known, the surfaces of its body and wheels."""
     if size is None:
         return tuple(parts), ()
     solids = [part for part in parts if isinstance(part, Primitive)]

@@ -1,4 +1,4 @@
-"""Panels of signals over time: their curves, and the views that show them."""
+"""Panels of signals over time, with their curves and the views that show them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Channels(Protocol):
 
 
 def drawn_values(recording: Channels, channel: str) -> Array:
-    """Return a channel as drawn. The sideslip angle of a car that turns round continues beyond 180 deg."""
+    """Return a channel for drawing. The sideslip angle of a car that turns round continues beyond 180 deg."""
     if channel in AXLE_SLIP:
         slips, loads = (
             [recording[f"{wheel}_{what}"] for wheel in AXLE_SLIP[channel]] for what in ("slip_angle_rad", "tyre_fz_N")
@@ -58,7 +58,7 @@ class Line(NamedTuple):
     views: tuple[str, ...] = _EVERYWHERE  # views that draw the line
 
     def of(self, recording: Channels) -> Array | None:
-        """Return the values of a run [SI], or None if they are not meaningful."""
+        """Return the values of a run [SI], or None if they have no meaning."""
         if self.beside and not _holds(recording, self.beside):
             return None
         values = drawn_values(recording, self.channel)
@@ -187,12 +187,12 @@ def panels_in(view: str) -> tuple[Panel, ...]:
 
 
 def added_lines(recording: Channels) -> list[Line]:
-    """Return the lines of the angles that a system adds."""
+    """Return the lines of the steer angles that a system adds."""
     return [line for line in PANELS["added"].lines if line.of(recording) is not None]
 
 
 def link_panels(channels: Iterable[str]) -> tuple[Panel, ...]:
-    """Return a panel of link and spring forces for each corner, from channels such as `fl_spring_force_N`."""
+    """Return a panel of link and spring forces for each corner."""
     named = {corner: [name[3:] for name in channels if name.startswith(f"{corner}_")] for corner in CORNERS}
     # A part that all corners have, such as a spring, has the same colour in all of them.
     everywhere = [name for name in named[CORNERS[0]] if all(name in names for names in named.values())]

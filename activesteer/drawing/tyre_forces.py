@@ -1,4 +1,4 @@
-"""Tyre forces as arrows on the road, scaled so that they are as long on ice as on a dry road."""
+"""Tyre forces as arrows on the road, with one scale for the friction of all runs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ABOVE_ROAD_M: Final = 0.1
 
 
 def force_scale(recordings: Sequence[Recording]) -> float:
-    """Return the force per length of an arrow [N/m], the same for all runs that are shown together.
+    """Return the force per length of an arrow [N/m], equal for all runs in one view.
 
     It is proportional to the largest friction under any of their tyres.
     """
@@ -38,7 +38,7 @@ def force_scale(recordings: Sequence[Recording]) -> float:
 
 
 def force_arrows(recording: Recording, scale_NpM: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return origins and vectors of the arrows in the world [m], each of shape (rows, 4, 3)."""
+    """Return origins and vectors of the arrows in world axes [m], each of shape (rows, 4, 3)."""
     origins = np.empty((len(recording), len(CORNERS), 3), np.float32)
     vectors = np.zeros_like(origins)
     origins[:, :, 2] = _ABOVE_ROAD_M

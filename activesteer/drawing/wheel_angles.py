@@ -1,4 +1,4 @@
-"""Enlarged angles of the wheels as wedges, which make 2 deg of rear steering visible.
+"""Wedges that enlarge the angles of the wheels, so that 2 deg of rear steering is visible.
 
 Points are in the axes of the car: x forward and y left, the origin on the road below the middle of its front axle.
 """
@@ -33,7 +33,7 @@ _NOTHING_RAD: Final = math.radians(0.05)
 
 
 def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
-    """Return the factors that enlarge the angles of each wheel, the same for all runs that are shown together.
+    """Return the enlargement factor of each wheel's angle, equal for all runs in one view.
 
     The factor is ten, and less for an axle that steers by more than 9 deg.
     """
@@ -57,7 +57,7 @@ def angles_at(recording: Recording, time_s: Array | float) -> Array:
 
 
 def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
-    """Return wedges from straight ahead to the enlarged headings [m], tips at 0, shape (..., 4, SLICES + 2, 2)."""
+    """Return wedges from straight ahead to the enlarged steer angles [m], tips at 0, shape (..., 4, SLICES + 2, 2)."""
     shown = np.nan_to_num(np.asarray(angle_rad, np.float64) * factor)
     along = shown[..., None] * np.linspace(0.0, 1.0, SLICES + 1)
     arc = RADIUS_M * np.stack([np.cos(along), np.sin(along)], axis=-1)
@@ -65,7 +65,7 @@ def wedges(angle_rad: Array, factor: Sequence[int]) -> Array:
 
 
 def wheel_centres(size: Footprint) -> Array:
-    """Return the places of the wheels [m], shape (4, 2)."""
+    """Return the positions of the wheels [m], shape (4, 2)."""
     half = 0.5 * size.width_m - _WHEEL_M[1]
     return np.array([(x, side * half) for x in (0.0, -size.wheelbase_m) for side in (1.0, -1.0)])
 
@@ -77,7 +77,7 @@ def tips_beside(size: Footprint) -> Array:
 
 
 class Plan(NamedTuple):
-    """A car in plan view, with every part as a closed line in the axes of the car."""
+    """A plan view of a car, with every part as a closed line in the axes of the car."""
 
     body: Array  # outline of the body [m], shape (points, 2)
     wheels: Array  # outlines of the wheels [m], turned by the enlarged angles, shape (..., 4, 4, 2)
@@ -85,7 +85,7 @@ class Plan(NamedTuple):
 
 
 def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
-    """Return the plan view of a car with enlarged angles of its wheels."""
+    """Return the plan view of a car with enlarged wheel angles."""
     front, rear, half = size.front_m, size.rear_m, 0.5 * size.width_m
     body = np.array(
         [
@@ -102,7 +102,7 @@ def plan(size: Footprint, angle_rad: Array, factor: Sequence[int]) -> Plan:
 
 
 def words(angle_rad: float) -> str:
-    """Return the true angle and the side of a wedge as text, empty if the angle is unknown or practically zero."""
+    """Return the label of a wedge: its true angle and side, empty for an unknown or negligible angle."""
     if not abs(angle_rad) >= _NOTHING_RAD:
         return ""
     side = " left" if angle_rad > 0.0 else " right"

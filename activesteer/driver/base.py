@@ -84,7 +84,7 @@ class Driver(Protocol):
 
 
 class Drivetrain(Protocol):
-    """Engine and gearbox in the form that a driver knows."""
+    """Engine and gearbox, as known to a driver."""
 
     def speed_radps(self, wheel_speeds_radps: tuple[float, float, float, float], /) -> float:
         """Return the mean speed of the driven wheels, which turns the engine [rad/s]."""

@@ -1,4 +1,4 @@
-"""The human driver, in Python and in compiled code, and the search for drivers."""
+"""The human driver, in Python and in compiled code, and the look-up of drivers."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class HumanDriver(NativeBlock):
     _path: PathPreviewDriver
 
     def __init__(self, setup: DriverSetup) -> None:
-        """Combine three drivers for a car: for a steering wheel angle, a curvature, and a path."""
+        """Combine three drivers: for a steering wheel angle, for a curvature, and for a path."""
         robot, single_track = OpenLoopDriver.from_vehicle(setup), SingleTrack(setup.single_track)
         self._open_loop = robot
         self._constant_radius = ConstantRadiusDriver(robot, single_track.wheelbase_m, setup.timestep_s)
@@ -125,7 +125,7 @@ class SetpointTable(NamedTuple):
 
 
 def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable:
-    """Return setpoints as a table, up to where the path changes."""
+    """Return setpoints as a table, up to a change of the path."""
     path = setpoints[0].path
     steps = next((step for step, setpoint in enumerate(setpoints) if setpoint.path is not path), len(setpoints))
     count = steps
@@ -136,7 +136,7 @@ def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | N
 
 
 class SharedTables:
-    """Setpoints of manoeuvres over the next steps, for cars that are driven in a batch."""
+    """Tabulated setpoints of the next steps, for the cars of a batch."""
 
     def __init__(self) -> None:
         """Start without tables."""
@@ -162,7 +162,7 @@ class SharedTables:
 
 
 def setpoint_row(setpoint: Setpoint, rack_per_steering_wheel_m: float | None) -> tuple[Any, ...]:
-    """Return a setpoint as its record takes it (see `tabulate`)."""
+    """Return a setpoint in the form of its record (see `tabulate`)."""
     turn, speed, pedal, holds, curvature, rack, wheels, path, parking = setpoint
     kind = ANGLE
     if path is not None:
@@ -226,7 +226,7 @@ _MAX_TORQUE_NM: Final = 1e6
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Kind of block for drivers, where a command is completed by the angle at the road wheel."""
+    """Kind of block for drivers. A command is completed by the angle at the road wheel."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """Return a command with the angle at the road wheel (see the base class)."""
@@ -285,7 +285,7 @@ def driver_spec(given: Any) -> Plugin:
 
 
 def is_driver_file(given: Any) -> bool:
-    """Return whether a driver is given as data, by name, file or table, and not as code."""
+    """Return whether a driver is given as data (name, file or table), not as code."""
     return isinstance(given, Mapping) or DRIVER.is_data(given)
 
 

@@ -65,7 +65,7 @@ class SpeedHold(NativeBlock):
         return drive_torque(self, speed_demand_mps, measurement.speed_mps, engine_radps, *limits_Nm)
 
     def reset(self) -> None:
-        """Reset the integral, as when the driver lifts off the accelerator."""
+        """Reset the integral, for example when the driver lifts off the accelerator."""
         take_foot_off(self)
 
 
@@ -73,7 +73,7 @@ class SpeedHold(NativeBlock):
 def drive_torque(
     hold: SpeedHold, speed_demand_mps: float, speed: float, engine_radps: float, low: float, high: float
 ) -> float:
-    """Law of `SpeedHold.step`: the total torque at the driven wheels."""
+    """Law of `SpeedHold.step`."""
     if speed_demand_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
         take_foot_off(hold)
         return 0.0
@@ -105,7 +105,7 @@ def drive_torque(
 
 @shared
 def take_foot_off(hold: SpeedHold) -> None:
-    """Law of `SpeedHold.reset`: clear the integral."""
+    """Law of `SpeedHold.reset`."""
     hold._integral_Nm = 0.0
     hold._pedal = 1.0
     hold.saturated = False
@@ -115,7 +115,7 @@ NO_RACK: Final = "the steering wheel of this car drives no rack; give steering_w
 
 
 class OpenLoopDriver(NativeBlock):
-    """A steering robot and a cruise control.
+    """A steering robot with a cruise control.
 
     Attributes:
         speed_hold: The cruise control.
@@ -149,7 +149,7 @@ class OpenLoopDriver(NativeBlock):
 
     @classmethod
     def from_vehicle(cls, setup: DriverSetup) -> OpenLoopDriver:
-        """Make the driver for a car."""
+        """Create the driver for a car."""
         mass_kg = setup.single_track.mass_kg
         speed_hold = SpeedHold(setup.parameters, setup.drive, mass_kg, setup.wheel_radius_m, setup.timestep_s)
         return cls(speed_hold, setup.steering_ratio, setup.steering_wheel_limit_rad, setup.rack_per_steering_wheel_m)
@@ -167,7 +167,7 @@ class OpenLoopDriver(NativeBlock):
         return self.steer_to(setpoint.rack_demand_m / self._rack_per_steering_wheel_m, setpoint, measurement)
 
     def steer_to(self, angle: float, setpoint: Setpoint, measurement: Measurement) -> DriverCommand:
-        """Return the command for a steering wheel angle [rad] in place of the angle of the setpoint."""
+        """Return the command for a steering wheel angle [rad] that replaces the angle of the setpoint."""
         speed_mps, drive = setpoint.speed_demand_mps, self.speed_hold.drive
         engine_radps, limits_Nm = 0.0, (0.0, 0.0)
         if setpoint.hold_speed:
@@ -193,7 +193,7 @@ def turned(
     low_Nm: float,
     high_Nm: float,
 ) -> tuple[float, float, bool, int]:
-    """Law of `OpenLoopDriver.steer_to`: steering wheel angle, drive torque, whether a limit is active, gear."""
+    """Law of `OpenLoopDriver.steer_to`, which also returns the gear and whether a limit is active."""
     saturated = False
     if angle > robot.steering_wheel_limit_rad:
         angle, saturated = robot.steering_wheel_limit_rad, True

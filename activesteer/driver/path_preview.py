@@ -50,7 +50,7 @@ _LEAST_LAG_S: Final = 1e-3
 
 
 class SteeringGains(NamedTuple):
-    """Gains of the steering wheel angle that the driver decides on.
+    """Preview gains of the steering wheel angle.
 
     Attributes:
         per_yaw_rate_s: Gain of the yaw rate [rad/(rad/s)].
@@ -114,7 +114,7 @@ class PathPreviewDriver(NativeBlock):
         self._steps = 0
 
     def gains_at(self, rounded: int) -> Array:
-        """Return the gains at a rounded speed as one row, and keep them for compiled code.
+        """Return the gains at a rounded speed in one row, stored for compiled code.
 
         Args:
             rounded: Speed in steps of `SPEED_STEP_MPS`.
@@ -132,14 +132,14 @@ class PathPreviewDriver(NativeBlock):
             self._row_size = row.size
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over the attributes of a copy, whose gains are elsewhere in memory."""
+        """Restore the attributes, and store the gains anew, because a copy has other memory."""
         self.__dict__.update(state)
         self._known = np.zeros(N_SPEEDS)
         for rounded, row in self._gains.items():
             self._note(rounded, row)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command of the driver, who repeats his last decisions without a path."""
+        """Return the command of the driver. Without a path he repeats his last decisions."""
         path = setpoint.path
         if self._steps % self._preview_every_steps == 0 and path is not None:
             decided = self._decided_rad
@@ -251,7 +251,7 @@ def _steering_gains(
     parameters: DriverParameters,
     steering_ratio: float,
 ) -> SteeringGains:
-    """Cached `steering_gains` for the matrices of the car row by row."""
+    """Return `steering_gains` from a cache whose key is the rows of the car's matrices."""
     from scipy.linalg import expm, solve_discrete_are  # noqa: PLC0415 - slow to import, and only this driver needs it
 
     # States: yaw rate, sideslip angle, heading, lateral position, steering wheel angle; then the decision, held.

@@ -82,7 +82,7 @@ _ALIKE: Final = 0.6
 
 @inlined
 def _slides(memory, duration_s):
-    """Return whether the brakes slide wheels of both sides on one friction, as an anti-lock system does repeatedly."""
+    """Return whether wheels of both sides slide under braking on the same friction."""
     left, right = 0.0, 0.0
     for wheel in range(4):
         slip = 1.0 - memory.by_wheel_mps[wheel] / max(memory.speed_mps, SLOWEST_MPS)
@@ -106,7 +106,7 @@ def _steer(known, memory, steering, actuators):
 
 @compiled
 def _start(known, memory, said, line):
-    """Start in the first call: the car drives straight ahead at the speed of its wheels."""
+    """Initialise at the first call: the car drives straight ahead at the speed of its wheels."""
     rolled_mps = 0.0
     for wheel in range(4):
         memory.last_spin_radps[wheel] = said[SAID_SPINS + wheel]
@@ -154,7 +154,7 @@ def _filter(known, tyres, memory, said, line):
 
 @compiled
 def _predict_present(known, tyres, memory, line):
-    """Advance only the model from the time of the filters to the current time, with the later angles."""
+    """Predict from the time of the filters to the current time with the model and later steer angles."""
     now, count, length = memory.now, memory.calls, len(line)
     for index in range(N_STATES):
         now[index] = memory.state[index]
@@ -199,7 +199,7 @@ def _write_estimate(known, memory):
 
 @compiled
 def advance(known, tyres, memory, said, line):
-    """Process the current measurement and return the estimate, with records of shape (1,)."""
+    """Process the current measurement and return the estimate."""
     k, m = known[0], memory[0]
     first = m.calls == 0
     if first:

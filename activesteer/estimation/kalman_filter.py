@@ -1,4 +1,4 @@
-"""The filter of the lateral motion: an extended Kalman filter on the two-track model, compiled.
+"""The filter of the lateral motion: a compiled extended Kalman filter on the two-track model.
 
 It measures the yaw rate r + b_r and the lateral acceleration a_y + g p + b_y with the roll angle p: an accelerometer
 leans with the body. Differences give the derivatives of the model. The unknowns of the model are
@@ -116,7 +116,7 @@ def begin(known, memory):
 
 @inlined
 def _step_of(state, place):
-    """Step of a finite difference, away from zero, so that mirrored states have mirrored derivatives."""
+    """Step of a finite difference, away from zero. Mirrored states then have mirrored derivatives."""
     return math.copysign(_DIFFERENCES[place], state[place])
 
 
@@ -179,7 +179,7 @@ def _forget(known, memory, duration_s, moved, slope, added):
 
 @compiled
 def _add_noise(known, tyres, memory, duration_s, added):
-    """Write the process noise covariance of the motion over an interval into `added`."""
+    """Write the process noise covariance of the motion over an interval."""
     front_N, rear_N = forces_of(known, tyres, memory, memory.state)
     front, rear = _force_errors(known, front_N, rear_N)
     # An error that lasts for a time acts like white noise of twice this time.
@@ -239,7 +239,7 @@ def predict(known, tyres, memory, duration_s):
 
 @inlined
 def _with_friction(known, tyres, memory, friction):
-    """Return the lateral acceleration by the forces of the tyres on another friction [m/s2]."""
+    """Return the lateral acceleration from the tyre forces on another friction [m/s2]."""
     memory.state[FRICTION] = friction
     front_N, rear_N = forces_of(known, tyres, memory, memory.state)
     across_N = front_N * math.cos(memory.front_angle_rad) + rear_N * math.cos(memory.rear_angle_rad)
@@ -248,7 +248,7 @@ def _with_friction(known, tyres, memory, friction):
 
 @compiled
 def _over_friction(known, tyres, memory, here_mps2):
-    """Return slope and curvature of the lateral acceleration versus friction, over the range of its uncertainty."""
+    """Return slope and curvature of the lateral acceleration versus friction, within its uncertainty."""
     kept, spread = memory.state[FRICTION], math.sqrt(3.0 * memory.covariance[FRICTION, FRICTION])
     high, low = min(kept + spread, LARGEST_FRICTION), max(kept - spread, LEAST_FRICTION)
     above_mps2 = _with_friction(known, tyres, memory, high)
@@ -287,7 +287,7 @@ def _take_in(state, covariance, row, error, variance):
 
 @compiled
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
-    """Process a measurement after an interval, and change state and covariance by it.
+    """Update state and covariance with a measurement after an interval.
 
     Returns:
         Squared error of both values over its expected covariance, chi-square distributed with two degrees of freedom,
@@ -337,7 +337,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
 
 @compiled
 def reopen(known, memory):
-    """Reset the uncertainty of the friction to its value at the start, because the car has met another road."""
+    """Reset the uncertainty of the friction to its initial value, because the road has changed."""
     covariance = memory.covariance
     for place, size in ((FRICTION, known.friction_std), (REAR_RATIO, _NEW_RATIO_STD)):
         variance = max(covariance[place, place], size * size)
@@ -347,7 +347,7 @@ def reopen(known, memory):
 
 @compiled
 def take_in_friction(memory, friction, duration_s):
-    """Correct the friction by the friction of sliding wheels."""
+    """Correct the friction with the friction of sliding wheels."""
     covariance, std = memory.covariance, _SLIDING_STD * friction
     # Its error lasts: during this time all samples count as one measurement.
     variance = std * std * (1.0 + 2.0 * SLIDING_S / duration_s)

@@ -1,4 +1,4 @@
-"""Knowledge and memory of an estimator, as records for compiled code."""
+"""Records of an estimator for compiled code: parameters and memory."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ _SHORTEST_WAIT_S: Final = 0.005
 
 
 def known_of(setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> NDArray[Any]:
-    """Return the knowledge of an estimator: a record of `KNOWN`, shape (1,).
+    """Return the parameters and properties that an estimator knows, as a record of `KNOWN`.
 
     Car: largest lateral acceleration by its tyres on the road of their files; for each axle its compliance, wheel load,
     load transfer per lateral and longitudinal acceleration, relaxation length and steps of the tyre grid; roll of the

@@ -1,4 +1,4 @@
-"""Parameters and knowledge of an estimator: the unloaded car with new tyres, and the sensors' data sheets."""
+"""Setup of an estimator: the unloaded car with new tyres, and the sensors' data sheets."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ GRID: Final = (10, 41)
 
 @dataclass(frozen=True)
 class KnownTyre:
-    """Tyre as an estimator knows it: new, upright, on the road of its file.
+    """Tyre in the model of the estimator: new, upright, on the road of its file.
 
     Attributes:
         slip_angle_step_rad: Step of the slip angles of the grid, from 0 [rad].

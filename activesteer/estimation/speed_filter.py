@@ -1,4 +1,4 @@
-"""The compiled filter of the speed, from reliable wheels and the longitudinal acceleration.
+"""The compiled filter of the speed. It uses reliable wheels and the longitudinal acceleration.
 
 Load, longitudinal force and speed of each wheel come first, from the sensors:
 
@@ -94,7 +94,7 @@ def read_wheels(known, tyres, memory, said, duration_s):
 
 @compiled
 def start_speed(known, memory, speed_mps):
-    """Start with the speed by the wheels."""
+    """Initialise with the speed from the wheels."""
     memory.speed_mps, memory.ax_offset_mps2 = speed_mps, 0.0
     memory.speed_variance = known.wheel_variance_m2ps2 + (0.01 * speed_mps) ** 2
     memory.speed_offset_covariance, memory.offset_variance = 0.0, known.ax_offset_std_mps2**2
@@ -102,7 +102,7 @@ def start_speed(known, memory, speed_mps):
 
 @compiled
 def predict_speed(known, memory, rate_mps2, duration_s):
-    """Advance speed and offset by an interval, for a rate of the speed without the offset."""
+    """Predict speed and offset over an interval."""
     memory.speed_mps += duration_s * (rate_mps2 - memory.ax_offset_mps2)
     memory.speed_variance += duration_s * (duration_s * memory.offset_variance - 2.0 * memory.speed_offset_covariance)
     memory.speed_offset_covariance -= duration_s * memory.offset_variance

@@ -1,4 +1,4 @@
-"""The compiled two-track model of the estimator: lateral motion, axle forces, and their unknown parts.
+"""The compiled two-track model of the estimator: lateral motion, axle forces, and their errors.
 
 For the axles i = f, r:
 
@@ -145,7 +145,7 @@ def slip_angles(known, memory, state, vx_mps):
 
 @compiled
 def follow(known, tyres, memory, state, duration_s, out):
-    """Write the state after an interval with constant inputs into `out`, which may be `state` itself."""
+    """Compute the state after an interval with constant inputs. `out` may be `state` itself."""
     for index in range(N_STATES):
         out[index] = state[index]
     vx = memory.speed_mps
@@ -179,7 +179,7 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """Advance the roll of the body by an interval, with its effect `loading_mps2` on the wheels.
+    """Advance the roll of the body by an interval, including the load of springs and dampers.
 
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
     """

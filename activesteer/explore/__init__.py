@@ -1,4 +1,4 @@
-"""A local page to change a run by sliders and to drive a car by hand: `activesteer explore`.
+"""A local page to change a run with sliders and to drive a car by hand: `activesteer explore`.
 
 The browser talks to one server process (`server`) over a WebSocket. The server passes messages to one worker process
 (`worker`), which alone knows simulations: runs for the sliders (`runs`) and the drive by hand (`drive`).

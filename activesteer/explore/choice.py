@@ -39,14 +39,14 @@ _ARGUMENTS: Final = {3: "controllers", 4: "drivers"}
 
 
 class Folder:
-    """Names that the page may use: of the package, and files of one folder."""
+    """Names that the page may use, from the package and from one folder."""
 
     def __init__(self, path: Path) -> None:
         """Store the folder."""
         self.path = path
 
     def names(self) -> dict[str, list[str]]:
-        """Return the names of manoeuvres, vehicles, drivers and controllers, with the folder's names last."""
+        """Return the names of manoeuvres, vehicles, drivers and controllers, with those of the folder last."""
         names = _of_package()
         files = sorted([*self.path.glob("*.toml"), *self.path.glob("*.py"), *self.path.glob("vehicles/*/*.toml")])
         for file in files:
@@ -67,7 +67,7 @@ class Folder:
             self.check_name("controller", controller)
 
     def check_name(self, key: str, name: str) -> None:
-        """Check that the package knows a name, or that it is the name of a file in the folder."""
+        """Reject a name that is neither in the package nor a file in the folder."""
         kind = f"{key}s"
         if name in _of_package()[kind]:
             return
@@ -82,7 +82,7 @@ class Folder:
             raise ParameterError(f"is {shown(name)}, but {self.path} has no file {file}", key=key, value=name)
 
     def located(self, name: str) -> str:
-        """Return a name as the simulation takes it: a file with its folder."""
+        """Return a name as the simulation takes it, with the folder for a file."""
         return str(self.path / name) if ".toml" in name or ".py:" in name else name
 
 
@@ -105,7 +105,7 @@ def titles() -> dict[str, str]:
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the list that a file belongs to and the ending of its name, without executing its code."""
+    """Yield the lists that offer a file, with the ending of its name, without executing its code."""
     text = file.read_text("utf-8")
     if file.suffix == ".toml":
         table = tomllib.loads(text)

@@ -167,7 +167,7 @@ class DriveSession:
         return np.empty((0, 2)) if course is None else course.cone_centres_m()
 
     def start(self) -> Iterator[Reply]:
-        """Yield the course with the shape of the car, and the frame at the start."""
+        """Yield the course with the shape of the car, then the frame at the start."""
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
@@ -190,7 +190,7 @@ class DriveSession:
         return Reply({"kind": "going", "file": self.path.name})
 
     def act(self, message: Act) -> None:
-        """Carry out a message of the page: hands, controller, speed to hold, friction."""
+        """Apply a message of the page: hands, controller, speed to hold, friction."""
         if message.controller:
             self._folder.check_name("controller", message.controller)
             self._simulation.loop.replace_controller(self._folder.located(message.controller))
@@ -290,7 +290,7 @@ class DriveSession:
                     self._last_lap_s = self._lap_s
 
     def _look_for_missed_gates(self, course: Course) -> None:
-        """Record if the car has passed a cone on the wrong side."""
+        """Record whether the car has passed a cone on the wrong side."""
         x_m, y_m = (self._simulation.truth[f"front_axle_{axis}_m"] for axis in "xy")
         cones = self._cones()
         passed_x_m, passed_y_m = cones[(self._front_x_m < cones[:, 0]) & (cones[:, 0] <= x_m)].T

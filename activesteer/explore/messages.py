@@ -1,4 +1,4 @@
-"""Messages of the page: their fields, ranges and sizes, checked only here, and the queue of waiting messages."""
+"""Messages of the page: fields, ranges and sizes, all checked here, and the queue of waiting messages."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Start(Choice, frozen=True, tag="start"):
 
 
 class Act(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"):
-    """Hands and feet, controller, speed and friction during a drive, each unchanged if unset."""
+    """Input during a drive: hands and feet, controller, speed and friction, each unchanged if unset."""
 
     # Position of the steering, -1 full right to 1 full left. Throttle, brake and direct count with it
     steer: Annotated[float, Meta(ge=-1.0, le=1.0)] | UnsetType = UNSET
@@ -117,7 +117,7 @@ def add(waiting: deque[Message], message: Message) -> bool:
 
 
 def _is_replaced(message: Message) -> bool:
-    """Return whether a newer message of its type makes this one useless."""
+    """Return whether a newer message of the same type replaces this one."""
     if isinstance(message, Act):
         return message.controller is UNSET and message.speed_kmh is UNSET and message.mu is UNSET and not message.go
     return True

@@ -1,4 +1,4 @@
-"""Runs for the sliders: a choice of the page becomes curves, track, poses and key figures of each controller."""
+"""Runs for the sliders: curves, track, poses and key figures of each controller for a choice of the page."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Slider(NamedTuple):
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
-    """Return the sliders of a run. For groups in `own` (group -> the user's file), use all numbers of the file."""
+    """Return the sliders of a run, with all numbers of the user's file for groups in `own`."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for group, file in (own or {}).items():
         found += _of_file(group, scenario, file)
@@ -140,7 +140,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
-    """Return the slider of a gain, from zero to some multiples of its value, or None if it is not a number."""
+    """Return the slider of a gain, from zero to a multiple of its value, None if it is not a number."""
     if not _is_number(declared.default):
         return None
     tables, _, name = key.rpartition(".")
@@ -168,7 +168,7 @@ POSE_HZ: Final = 50.0
 
 
 def shape_of(vehicle: Vehicle) -> tuple[dict[str, Any], list[NDArray[np.float32]]]:
-    """Return the surfaces of a car."""
+    """Return the surfaces of a car for the page."""
     size = Footprint.from_table(vehicle.dimensions())
     _, panels = dressed(scene_of(vehicle.model), size)
     shown = [panel for panel in panels if panel.body in BODIES]
@@ -196,7 +196,7 @@ def poses_of(recording: Recording) -> tuple[float, NDArray[np.float32]]:
 
 
 def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], ...]]:
-    """Return the ground for the page: its height, and the mesh of an uneven road with colour factors."""
+    """Return the ground for the page: its height, and the coloured mesh of an uneven road."""
     drawn = surface_in(recording.metadata)
     if drawn is None:
         return 0.0, ()
@@ -247,7 +247,7 @@ class Runs:
         )
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
-        """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
+        """Drive the chosen controllers, and yield a reply when each run ends."""
         self._kept, self._choice = {}, None  # what fails from here on leaves nothing to save
         self.folder.check(choice)
         overrides = choice.values
@@ -312,14 +312,14 @@ class Runs:
         return sliders(self._resolved(choice, {}), self._located(choice), own)
 
     def _limits(self, choice: Choice) -> dict[str, tuple[float, float]]:
-        """Return the limits of the sliders, kept from the last choice because they take as long as a run."""
+        """Return the limits of the sliders. They are cached, because they take as long as a run."""
         names = choice.maneuver, choice.vehicle, choice.driver, choice.controllers
         if self._limits_of[0] != names:
             self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         return self._limits_of[1]
 
     def _held(self, choice: RunRequest, scenario: Scenario) -> tuple[Scenario, str]:
-        """Return a scenario with its amplitude, and words for its title.
+        """Return a scenario with its amplitude, and a description of the amplitude for the title.
 
         While a slider moves, the amplitude is that of the last search, else a new one.
         """

@@ -184,13 +184,13 @@ class ExploreServer:
                 self._hand_on(End())
 
     def _hand_on(self, message: Message) -> bool:
-        """Put a message for the worker into the queue, and return whether it fitted."""
+        """Queue a message for the worker, and return False if the queue is full."""
         taken = add(self._waiting, message)
         self._came.set()
         return taken
 
     async def _feed(self) -> None:
-        """Pass messages to the worker outside the event loop, because its pipe may be full."""
+        """Send messages of the page to the worker, outside the event loop because its pipe may be full."""
         loop = asyncio.get_running_loop()
         while True:
             await self._came.wait()
@@ -200,7 +200,7 @@ class ExploreServer:
                     await loop.run_in_executor(None, self._pipe.send, self._waiting.popleft())
 
     async def _pump(self) -> None:
-        """Pass messages of the worker to the page, and replace a worker that has ended."""
+        """Send messages of the worker to the page, and replace a worker that has ended."""
         loop = asyncio.get_running_loop()
         while True:
             try:
@@ -243,7 +243,7 @@ class ExploreServer:
 
 
 def _packed(header: dict[str, Any], arrays: list[Any]) -> bytes:
-    """Return a message: length, JSON, and then the arrays as numbers of 32 bits."""
+    """Encode a message: length, JSON, then the arrays as numbers of 32 bits."""
     text = json.dumps(finite({**header, "arrays": [list(shape) for shape, _ in arrays]}), allow_nan=False).encode()
     text += b" " * (-(4 + len(text)) % 4)  # the numbers begin at a multiple of their size
     return struct.pack("<I", len(text)) + text + b"".join(data for _, data in arrays)

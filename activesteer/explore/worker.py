@@ -134,7 +134,7 @@ def _error(error: BaseException, message: Message) -> Reply:
 
 
 def _words(error: BaseException) -> str:
-    """Return the message of an error of this package, or the class and message of any other error."""
+    """Return the message of an error, with its class for errors of other packages."""
     if isinstance(error, ActiveSteerError):
         return str(error)
     try:

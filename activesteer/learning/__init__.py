@@ -1,4 +1,4 @@
-"""Gymnasium environments on `Batch`, which the import of this package registers.
+"""Gymnasium environments on `Batch`, registered on import.
 
 Examples:
     >>> import gymnasium

@@ -104,7 +104,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         )  # fmt: skip
 
     def render(self) -> Any:
-        """Return an image, shape (height, width, 3), or show it in MuJoCo's viewer."""
+        """Return an image, or show it in MuJoCo's viewer."""
         if self.render_mode is None:
             return None
         loop = self.episodes.loop(0)
@@ -113,7 +113,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         return self._picture.drawn(loop)
 
     def recording(self) -> Recording:
-        """Drive the episode once more with the actions so far, and return its recording.
+        """Repeat the episode with the actions so far, and return its recording.
 
         The recording equals the episode to the last bit. Its `save` writes a file for `activesteer replay`, `video`
         and `report`.
@@ -134,13 +134,13 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
 
 def _first(command: Any) -> Any:
-    """Return the first of several commands."""
+    """Return the command of the first car of a batch."""
     first = (value[0].tolist() if isinstance(value, np.ndarray) else value for value in command)
     return type(command)(*(tuple(value) if isinstance(value, list) else value for value in first))
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
-    """Return options of `Episodes`, after checking their names."""
+    """Return options of `Episodes`, after a check of their names."""
     names = [name for name in signature(Episodes).parameters if name not in ("task", "n")]
     for name in options:
         if name not in names:
@@ -187,7 +187,7 @@ class _Picture:
 
 
 class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
-    """Many `CarEnv` in one native call, equal to their `SyncVectorEnv` in every autoreset mode.
+    """Many `CarEnv` in one native call, bit-identical to `SyncVectorEnv` in every autoreset mode.
 
     Attributes:
         episodes: The simulation.
@@ -278,7 +278,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
 
     @staticmethod
     def _told(found: Outcome, mask: NDArray[np.bool_]) -> dict[str, Any]:
-        """Return the infos of the environments of a mask, as `VectorEnv` collects them."""
+        """Return the infos of the masked environments in the format of `VectorEnv`."""
         if not mask.any():
             return {}
         terms: dict[str, Any] = {}

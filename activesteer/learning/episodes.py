@@ -89,7 +89,7 @@ TASKS: Final[dict[str, Task]] = {
 
 
 def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[dict[str, Any]]:
-    """Draw overrides of cars, roads and drivers from the package's population, without those that the task sets."""
+    """Draw overrides of cars, roads and drivers from the package's population, except overrides of the task."""
     population = read_study(_POPULATION)
     keys = [key for key in population.keys if not key.startswith(("controllers.", "sensors."))]
     factors = [one for one in population.factors if one.key in keys and one.key not in task.overrides]
@@ -257,7 +257,7 @@ class Episodes:
         self._started = np.zeros(n, dtype=bool)
 
     def reset(self, episodes: Sequence[int], generators: Sequence[np.random.Generator]) -> NDArray[np.float32]:
-        """Restart some episodes, each with a car that its generator draws, and return all observations."""
+        """Restart some episodes, each with a newly drawn car, and return all observations."""
         for episode, generator in zip(episodes, generators, strict=True):
             self._active[episode] = episode * self._cars + int(generator.integers(self._cars))
         cars = self._active[list(episodes)]
@@ -268,15 +268,15 @@ class Episodes:
 
     @property
     def active(self) -> NDArray[np.intp]:
-        """Index of the car that drives in each episode, within the cars of that episode."""
+        """Index of the active car of each episode."""
         return self._active % self._cars
 
     def loop(self, episode: int) -> Any:
-        """Return the closed loop of the car that drives in an episode."""
+        """Return the closed loop of the active car of an episode."""
         return self.batch.loops[int(self._active[episode])]
 
     def step(self, actions: ArrayLike, episodes: Sequence[int] | NDArray[Any] | None = None) -> Outcome:
-        """Carry out the actions until the next decision.
+        """Apply the actions until the next decision.
 
         Args:
             actions: Shape (n, numbers); an action beyond its bounds is limited to them.
@@ -311,7 +311,7 @@ class Episodes:
         return Outcome(self._observe(tracked), reward, terminated, truncated, terms, sideslip, _END_NAMES[end])
 
     def _checked(self, actions: Any, chosen: NDArray[np.bool_]) -> Array:
-        """Return actions as numbers, shape (n, numbers)."""
+        """Convert actions to an array, shape (n, numbers)."""
         shape = self._n, len(self.actions)
         with suppress(TypeError, ValueError, OverflowError):
             given = np.asarray(actions)
@@ -326,7 +326,7 @@ class Episodes:
         return np.clip(actions, self._low, 1.0)
 
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
-        """Return actions within their bounds, shape (n, numbers), as commands of driver and controller.
+        """Convert bounded actions to commands of driver and controller.
 
         Each field is an array of length n, or zero. There is no command of the driver if the agent does not drive.
         """
@@ -340,7 +340,7 @@ class Episodes:
         return DriverCommand(**hands) if self._agent_drives else None, ActuatorCommand(**columns)
 
     def _tracked(self) -> tuple[Array, Array, Array]:
-        """Return distance to the left of the path [m], heading relative to it [rad], and points ahead [m], (n, k)."""
+        """Return the observations of the path: lateral distance, relative heading, and points ahead."""
         if not self._on_road:
             return np.zeros(self._n), np.zeros(self._n), np.zeros((self._n, len(_AHEAD_S)))
         motion, cars = arrays_of(Motion, self.batch.rows(Motion, self._active)), self._active

@@ -1,4 +1,4 @@
-"""Base of all manoeuvres: their kinds, speed, road, duration, a setpoint at any time, and the files that they name."""
+"""Base of all manoeuvres: kinds, speed, road, duration, setpoints, and the files that they name."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KINDS: Final[dict[str, type[Maneuver]]] = {}
 
 
 class NamedFile(NamedTuple):
-    """A key of a manoeuvre that names a file, and the keys next to it that the file fills."""
+    """A key of a manoeuvre that names a file, and the neighbouring keys that the file fills."""
 
     key: tuple[str, ...]  # the key, as the path of names to it
     fills: tuple[str, ...]  # keys that it fills, in the same table
@@ -97,17 +97,17 @@ class Maneuver(ABC):
         return None
 
     def sequence(self) -> Any:
-        """Return the object that follows the car through the phases of a run, or None without such phases."""
+        """Return the object that follows the car through the phases of a run, None without phases."""
         return None
 
     @property
     def ground(self) -> Road:
-        """Road as the car drives on it, with its friction laid along the course if the road follows it."""
+        """Road for the car, with its friction along the course if the road follows it."""
         return self.road.laid(self.course)
 
     @property
     def search(self) -> Search | None:
-        """Search that must be driven before the manoeuvre can be run, or None if all values are known."""
+        """Search that must be driven before the manoeuvre, or None if all values are known."""
         return None
 
     def settling_setpoint(self) -> Setpoint:
@@ -137,7 +137,7 @@ class Search:
 
 
 def within(value: float, most: float) -> float:
-    """Return a value limited to 0 and `most`, faster than by `min` and `max`."""
+    """Limit a value to the range from 0 to `most`."""
     return 0.0 if value < 0.0 else most if value > most else value
 
 
@@ -149,7 +149,7 @@ def check_begin(key: str, start_s: float, duration_s: float) -> None:
 
 
 def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: float = MIN_SEARCH_SPEED_MPS) -> None:
-    """Check that the car drives forwards and fast enough, with `instead` as the key that needs no search."""
+    """Check that the car drives forwards and fast enough."""
     if speed_mps < least_mps:
         given, least = 3.6 * speed_mps, 3.6 * least_mps
         problem = f"is {given:g} km/h; {needing} needs at least {least:g} km/h, forwards"
@@ -160,7 +160,7 @@ def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: fl
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Read required and optional columns of a CSV whose first line names them.
+    """Read required and optional columns of a CSV file with a header.
 
     Other columns are ignored.
 
@@ -220,7 +220,7 @@ def _profile(file: Path) -> dict[str, Any]:
 
 
 def _crg(file: Path) -> dict[str, Any]:
-    """Return an OpenCRG file with the files that it refers to, packed."""
+    """Return the packed content of an OpenCRG file and the files that it refers to."""
     files = {file.name: read_bytes(file, ManeuverError, limits.MAX_CRG_BYTES)}
     name, place = file.name, file
     for _ in range(limits.MAX_CRG_FILES):
@@ -246,7 +246,7 @@ _ROAD_FILES: Final = (
 def with_files(
     kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Return a table with the values of its files, and the CSV files that the recording keeps.
+    """Insert the values of the files into a table, and return the CSV files for the recording.
 
     A table without a file has no `folder`, and may have both the name of a file and values. It comes from a recording,
     and the values are those that were read then, unless an override names another file.

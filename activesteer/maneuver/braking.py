@@ -37,7 +37,7 @@ class BrakeInput:
     """Time until the pedal is in position [s]."""
 
     def check_end(self, duration_s: float) -> None:
-        """Check that the pedal is in position before the end of the run."""
+        """Check that the pedal reaches its position before the end of the run."""
         pressed_s = self.start_s + self.rise_s
         if pressed_s >= duration_s:
             problem = f"the brake is pressed down at {pressed_s:g} s, but the run ends at {duration_s:g} s"
@@ -68,7 +68,7 @@ class BrakeInTurn(Maneuver, kind="brake_in_turn"):
 
     @property
     def search(self) -> Search | None:
-        """Search for the angle by a step steer, if only the lateral acceleration is given, which stays on record."""
+        """Return the search for the angle by a step steer, if only the lateral acceleration is given."""
         turn = self.turn
 
         def accept(angle: float) -> BrakeInTurn:
@@ -98,7 +98,7 @@ _MIN_SPEED_MPS: Final = 10.0 / 3.6
 
 @dataclass(frozen=True, kw_only=True)
 class StraightBraking(Maneuver, kind="straight_braking"):
-    """Driving straight ahead, then braking with an open clutch until the car stands."""
+    """Driving straight ahead, then braking to rest with an open clutch."""
 
     brake: BrakeInput
     """The brake."""
@@ -112,7 +112,7 @@ class StraightBraking(Maneuver, kind="straight_braking"):
 
     @cached_property
     def course(self) -> Course | None:
-        """The straight line that the driver keeps, or None if the steering wheel is held."""
+        """Straight line that the driver follows, or None if the steering wheel is held."""
         return Course(Path.through([0.0, self.speed_mps * self.duration_s], [0.0, 0.0])) if self.hold_line else None
 
     def setpoint(self, time_s: float) -> Setpoint:

@@ -122,7 +122,7 @@ class PathSpeed:
         self._acceleration_mps2 = speed_mps * np.gradient(speed_mps, path.s_m)
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the current place of the car (see `PhaseSequence.setpoint`)."""
+        """Return the setpoint for the current position of the car (see `PhaseSequence.setpoint`)."""
         speed_mps, x_m, y_m = seen[3:6]
         self._along_m = self._search.nearest(x_m, y_m, self._along_m, _WINDOW_M)
         wanted_mps = float(np.interp(self._along_m, self._s_m, self._speed_mps))
@@ -182,7 +182,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
         return Course(path, width_m=self._along(path, self.path.width_m))
 
     def _along(self, path: Path, values: tuple[float, ...] | None) -> Array | None:
-        """Interpolate values at the given points to the points of the path."""
+        """Interpolate values at the given points to the resampled path."""
         if values is None:
             return None
         chords = np.hypot(np.diff(self.path.x_m or ()), np.diff(self.path.y_m or ()))
@@ -190,7 +190,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
         return np.interp(path.s_m, at * (path.length_m / at[-1]), values)
 
     def sequence(self) -> PathSpeed | None:
-        """Return the sequence that follows the speeds along the path, or None if the path has none."""
+        """Return the sequence that follows the speeds along the path, None without speeds."""
         path = self.course.path
         speeds_mps = self._along(path, self.path.speed_mps)
         return None if speeds_mps is None else PathSpeed(self, path, speeds_mps)
@@ -245,5 +245,5 @@ class ConstantRadius(Maneuver, kind="constant_radius"):
         return Setpoint(0.0, speed, 0.0, True, curvature)
 
     def settling_setpoint(self) -> Setpoint:
-        """Return the setpoint at time zero, which is straight ahead."""
+        """Return the initial setpoint, straight ahead."""
         return self.setpoint(0.0)

@@ -59,7 +59,7 @@ _AFTER_S: Final = 3.5
 
 @dataclass(frozen=True, kw_only=True)
 class AlongCourse(Maneuver):
-    """Base of the kinds that are driven along a course at constant speed."""
+    """Base of the kinds along a course at constant speed."""
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and passes the last gate within the run."""
@@ -90,7 +90,7 @@ class AlongCourse(Maneuver):
 
 
 def known_width(vehicle_width_m: float | None) -> float:
-    """Return the vehicle width for which the course is laid out [m]."""
+    """Return the vehicle width that sets the width of the lanes [m]."""
     if vehicle_width_m is None:
         raise ManeuverError(
             "is missing; it comes from the vehicle file (width_m) unless it is given here", key="vehicle_width_m"
@@ -154,7 +154,7 @@ _INCOMPATIBLE: Final = 1e-9
 
 
 class Bound(NamedTuple):
-    """Bounds on y of a point that moves with the car."""
+    """Bounds on the lateral position of a point that moves with the car."""
 
     x_m: float  # position of the car's centre [m]
     ahead_m: float  # distance of the point ahead of the centre, along the path [m]
@@ -199,7 +199,7 @@ def least_jerk(start_x_m: float, end_x_m: float, end_y_m: float, bounds: Sequenc
 
 
 def _bounded(a: Array, b: Array, g: Array, low: Array, high: Array) -> Array:
-    """Return the z that minimises |A z - b| for low <= G z <= high, for A of full column rank (LSI, LDP)."""
+    """Minimise |A z - b| for low <= G z <= high, with A of full column rank (LSI, LDP)."""
     from scipy.linalg import solve_triangular  # noqa: PLC0415 - slow to import
     from scipy.optimize import nnls  # noqa: PLC0415 - slow to import
 
@@ -269,7 +269,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
     """Width of the vehicle, for which the lanes are laid out [m]. Default: the width in the vehicle file."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Return the path and the speed, or the path without throttle."""
+        """Return the path and the speed, without throttle if released."""
         return self._setpoint if time_s < self._throttle_off_s else self._coasting
 
     @cached_property
@@ -311,7 +311,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
 
 
 def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of the lanes, with quintics between them that join without heading and curvature."""
+    """Return the middle line of the lanes, joined by quintics with zero heading and curvature at the joints."""
     end = course[-1].end_x_m
     x = np.linspace(0.0, end, math.ceil(end / _SAMPLE_M) + 1)
     middles = [0.5 * (lane.right_y_m + lane.left_y_m) for lane in course]

@@ -1,4 +1,4 @@
-"""Open loop: steering, speed, brake and wheel torques as tables over time, also from CSV files."""
+"""Open loop: tables of steering, speed, brake and wheel torques over time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SteeringTable:
     """Time by which the column comes later, for a recorded signal with a separate clock [s]."""
 
     def __post_init__(self) -> None:
-        """Check that times come with exactly one angle column, and that factor and delay have an effect."""
+        """Check that times and exactly one angle column are given, and that factor and delay have an effect."""
         if self.steering_wheel_rad is not None and self.rack_m is not None:
             raise ManeuverError("steering_wheel_rad and rack_m both steer the front wheels; leave one out")
         if self.steering_wheel_rad is None and self.rack_m is None:
@@ -86,17 +86,17 @@ class SensorOffsetTable:
     """Offsets of the sensors in a repeated measurement: readings minus true values."""
 
     yaw_rate_radps: float = 0.0
-    """Of the yaw rate [rad/s]."""
+    """Offset of the yaw rate [rad/s]."""
     ax_mps2: float = 0.0
-    """Of the longitudinal acceleration [m/s2]."""
+    """Offset of the longitudinal acceleration [m/s2]."""
     ay_mps2: float = 0.0
-    """Of the lateral acceleration [m/s2]."""
+    """Offset of the lateral acceleration [m/s2]."""
     roll_rad: float = 0.0
-    """Of the roll angle [rad]."""
+    """Offset of the roll angle [rad]."""
     pitch_rad: float = 0.0
-    """Of the pitch angle [rad]."""
+    """Offset of the pitch angle [rad]."""
     sideslip_rad: float = 0.0
-    """Of the sideslip angle [rad]."""
+    """Offset of the sideslip angle [rad]."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def _read(fills: str, columns: Sequence[str], file: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class OpenLoop(Maneuver, kind="open_loop"):
-    """Tables over time, for a car at a held speed, a coasting car, or given wheel torques."""
+    """Tables over time, for a car that holds its speed, coasts or follows wheel torques."""
 
     steering: SteeringTable = SteeringTable()
     """Steering wheel or rack. Default: straight ahead."""
@@ -237,7 +237,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
 
 
 def _interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Interpolate linearly, constant outside, with plain floats because this runs every step."""
+    """Interpolate linearly, constant outside, in plain floats because every step calls it."""
     index = bisect_right(xs, x)
     if index == 0:
         return ys[0]

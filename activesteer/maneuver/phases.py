@@ -1,4 +1,4 @@
-"""Phases: inputs that follow each other when the car reaches a state, not only at given times.
+"""Phases: inputs that follow each other, at given times or when the car reaches a state.
 
 Each phase moves steering wheel, speed and pedals to its values and ends by its condition. So a manoeuvre can react to
 the car: the fishhook steers back when the roll rate has died away.
@@ -26,7 +26,7 @@ _SENSES: Final = ("above", "below", "within")
 
 
 class Seen(NamedTuple):
-    """State of the car on which the end of a phase depends."""
+    """State of the car that can end a phase."""
 
     yaw_rate_radps: float  # left positive
     roll_rate_radps: float  # positive when the left side rises
@@ -75,7 +75,7 @@ class Until:
 
     @cached_property
     def conditions(self) -> tuple[tuple[int, str, float], ...]:
-        """Conditions on the car: place in `Seen`, sense, and value."""
+        """Conditions on the car: index in `Seen`, direction and value."""
         found = []
         for place, name in enumerate(Seen._fields):
             stem, _, unit = name.rpartition("_")
@@ -96,7 +96,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase, with None for each input that it leaves unchanged."""
+    """One phase. An input that is None stays unchanged."""
 
     name: str
     """Name, for the events in the recording."""
@@ -167,7 +167,7 @@ class Phases(Maneuver, kind="phases"):
 
     @property
     def search(self) -> Search | None:
-        """Search for A, if a phase needs it."""
+        """Return the search for A, if a phase needs it."""
         if not self._needs_reference:
             return None
         return reference_angle_search(self, lambda angle: dataclasses.replace(self, reference_angle_rad=angle))
@@ -177,7 +177,7 @@ class Phases(Maneuver, kind="phases"):
         return PhaseSequence(self)
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Return the setpoint of phases that end only by their times and inputs."""
+        """Return the setpoint of phases that end only by time."""
         # A run uses `sequence`, which sees the car.
         sequence, never = self.sequence(), (math.nan,) * len(Seen._fields)
         while True:
@@ -248,7 +248,7 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver, after the step to the next phase if this one has ended.
+        """Return the setpoint for the driver, and start the next phase if the current one has ended.
 
         It is the setpoint at a time [s] and a state of the car, in the order of `Seen`.
         """

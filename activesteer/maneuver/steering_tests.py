@@ -74,16 +74,16 @@ class StepSteer(Maneuver, kind="step_steer"):
 
     @property
     def search(self) -> Search | None:
-        """Search for the amplitude, if only the lateral acceleration is given."""
+        """Return the search for the amplitude, if only the lateral acceleration is given."""
         return steady_turn_search(self, self.steer, self.with_amplitude)
 
     def with_amplitude(self, steering_wheel_rad: float) -> StepSteer:
-        """Return the step with an amplitude [rad], and with its lateral acceleration on record."""
+        """Return the step with an amplitude [rad], and record its lateral acceleration."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
 
 def steady_turn_search(maneuver: Maneuver, step: StepInput, accept: Callable[[float], Maneuver]) -> Search | None:
-    """Return the search for the amplitude of a step that gives its lateral acceleration, if the step has none."""
+    """Return the search for the amplitude of a step that gives only its lateral acceleration."""
     wanted = step.lateral_acceleration_mps2
     if step.steering_wheel_rad is not None or wanted is None:
         return None
@@ -200,7 +200,7 @@ _LINES: Final = 5
 
 @dataclass(frozen=True)
 class RandomSignal:
-    """Random steering wheel angle: normally distributed, with the same power at all frequencies of a band."""
+    """Random steering wheel angle: normally distributed, with constant power density in a frequency band."""
 
     rms_rad: Annotated[float, Range(0.0, 5.0)] = math.radians(8.0)
     """Root mean square [rad]. Peaks are three to four times as large."""
@@ -222,7 +222,7 @@ class RandomSteer(Maneuver, kind="random_steer"):
     """The angle."""
 
     def __post_init__(self) -> None:
-        """Check that the band is wide enough for the run, because a sum of few sines is not random."""
+        """Check that the band is wide enough for the run. A sum of few sines is not random."""
         random = self.random
         least_Hz = random.lowest_Hz + _LINES / self.duration_s
         if not least_Hz <= random.highest_Hz <= _MOST_Hz:
@@ -236,7 +236,7 @@ class RandomSteer(Maneuver, kind="random_steer"):
 
     @cached_property
     def _angles_rad(self) -> list[float]:
-        """Angle every `_STEP_S`: a sum of sines within the band, of equal amplitudes and random phases."""
+        """Angle every `_STEP_S`: a sum of sines of equal amplitude and random phase."""
         random = self.random
         points = math.ceil(self.duration_s / _STEP_S) + 2
         lines_Hz = np.fft.rfftfreq(points, _STEP_S)
@@ -266,7 +266,7 @@ _RAMP_S: Final = 20.5
 
 
 def reference_angle_search(maneuver: Maneuver, accept: Callable[[float], Maneuver]) -> Search:
-    """Return the search for A, the steering wheel angle at 0.3 g, at the speed and on the road of a manoeuvre."""
+    """Return the search for A, the steering wheel angle at 0.3 g."""
     probe = SlowlyIncreasingSteer(
         kind="slowly_increasing_steer", name=f"{maneuver.name} (slow ramp to 0.3 g)", speed_mps=maneuver.speed_mps,
         duration_s=_RAMP_S, settle_s=maneuver.settle_s, road=maneuver.road, steer=_RAMP,
@@ -333,14 +333,14 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
 
     @property
     def search(self) -> Search | None:
-        """Search for A, if the amplitude is given as a multiple of A."""
+        """Return the search for A, if the amplitude is given as a multiple of A."""
         factor = self.steer.amplitude_factor
         if self.steer.steering_wheel_rad is not None or factor is None:
             return None
         return reference_angle_search(self, lambda angle: self.with_amplitude(factor * angle))
 
     def with_amplitude(self, steering_wheel_rad: float) -> SineWithDwell:
-        """Return the manoeuvre with an amplitude [rad], and with its factor on record."""
+        """Return the manoeuvre with an amplitude [rad], and record its factor."""
         return dataclasses.replace(self, steer=dataclasses.replace(self.steer, steering_wheel_rad=steering_wheel_rad))
 
     def setpoint(self, time_s: float) -> Setpoint:

@@ -1,4 +1,4 @@
-"""Steering wheel angle of a car on a measured circle: prediction, and a probability box.
+"""Steering wheel angle of a car on a measured circle: prediction and probability box.
 
 No parameter of the car is fitted. Values that vary from lap to lap are sampled. Values with one unknown true value (a
 reading of the source, an assumption) are intervals. The box is the pair of distributions at the ends of all intervals;
@@ -132,7 +132,7 @@ def validate_circle(
 
 
 def steering_wheel_deg(vehicle: str, case: Mapping[str, Any], roll_per_ay: float = 0.0) -> float:
-    """Return the steering wheel angle that holds a laterally symmetric car on a circle [deg]."""
+    """Return the steering wheel angle that holds a car without lateral asymmetry on a circle [deg]."""
     per_a, ay_mps2 = roll_per_ay * case["body_roll"], case["ay_mps2"]
     # A body that leans outwards by phi shows a cos(phi) + g sin(phi), and phi is proportional to a.
     for _ in range(20 if per_a else 0):
@@ -143,7 +143,7 @@ def steering_wheel_deg(vehicle: str, case: Mapping[str, Any], roll_per_ay: float
 
 
 def _on_circle(vehicle: str, case: Mapping[str, Any], ay_mps2: float, channel: str) -> float:
-    """Return the magnitude of a channel at a lateral acceleration on the circle, rack travel as a wheel angle."""
+    """Return the magnitude of a channel at a lateral acceleration on the circle."""
     slow, fast = (math.sqrt((ay_mps2 + beside) * case["radius_m"]) for beside in (-0.4, 0.2))
     overrides = {
         **{key: value for key, value in case.items() if key not in CIRCLE_KEYS},

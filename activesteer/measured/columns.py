@@ -1,4 +1,4 @@
-"""Columns of files of measured data in any format, read on demand: CSV, MAT, Parquet, MDF.
+"""Columns of measured data files (CSV, MAT, Parquet, MDF), read on demand.
 
 A damaged file may crash the library of another format. A child process, which runs this file, therefore reads them.
 """
@@ -44,13 +44,13 @@ class Column(NamedTuple):
 
 
 def check_rows(count: int, path: Path) -> None:
-    """Reject a file whose metadata state too many rows, before the rows are read."""
+    """Reject a file with too many rows in its metadata, before the rows are read."""
     limits.check_count(count, limits.MAX_ROWS, "rows", RecordingError, file=path.name)
 
 
 @contextmanager
 def understood(path: Path, what: str) -> Iterator[None]:
-    """Context that turns any exception of a file reader into a RecordingError of one line."""
+    """Context that converts any exception of a file reader into a RecordingError of one line."""
     try:
         yield
     except RecordingError:
@@ -72,7 +72,7 @@ def numbers(values: Any, name: str, path: Path) -> Array:
 
 
 def csv_columns(path: Path) -> list[Column]:
-    """Return the columns of a CSV."""
+    """Return the columns of a CSV file."""
     import pyarrow as pa  # noqa: PLC0415 - slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
 
@@ -128,7 +128,7 @@ def _text(data: bytes) -> str:
 
 
 def _clock_s(texts: list[str | None]) -> Array | None:
-    """Return times of day [s], increasing over midnight, or None if a text is not a time of day."""
+    """Parse times of day [s], increasing over midnight, or return None if a cell is not a time."""
     found = [_CLOCK.fullmatch((text or "").strip()) for text in texts]
     if not all(found):
         return None
@@ -148,7 +148,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _first_numbers(lines: list[str], path: Path) -> tuple[int, str]:
-    """Return the number of the first line of numbers, and the separator of its cells."""
+    """Return the index of the first line of numbers, and the separator of its cells."""
     # In such a line, every other cell may be a word, such as a gear, and one a date or a time of day.
     for number, line in enumerate(lines):
         for separator in ";\t|, ":
@@ -202,7 +202,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Number columns that share a name, as files such as MDF may contain, from the second one on."""
+    """Number repeated column names, from the second one on."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:
@@ -212,7 +212,7 @@ def _numbered(columns: list[Column]) -> list[Column]:
 
 
 def second_of(name: str) -> str:
-    """Return the name given to the second column of a name."""
+    """Return the name that distinguishes the second column of a name from the first."""
     return f"{name} (2)"
 
 
@@ -226,7 +226,7 @@ def find(columns: list[Column], name: str, path: Path) -> Column:
 
 
 def _in_child(path: Path) -> list[Column]:
-    """Return the columns of a file that a child process reads, which lives as long as the columns."""
+    """Return the columns of a file through a child process, which lives as long as the columns."""
     child = Child(__file__, limits.MAX_READER_BYTES, quiet=True)
 
     def asked(request: Any, doing: str) -> tuple[dict[str, Any], bytes]:

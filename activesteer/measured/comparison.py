@@ -57,7 +57,7 @@ def time_shift(measured: Recording, simulated: Recording) -> float:
 
 
 def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) -> list[tuple[Array, Array]]:
-    """Return signals of both runs, each without the mean of the simulation and relative to its range."""
+    """Return signals of both runs, shifted by the mean of the simulation and scaled by its range."""
     pairs = []
     for name in names:
         if name not in measured or name not in simulated:
@@ -70,7 +70,7 @@ def _pairs(measured: Recording, simulated: Recording, names: tuple[str, ...]) ->
 
 
 def _alike(pairs: list[tuple[Array, Array]], least: int) -> Array:
-    """Return the normalised cross-correlation over all shifts, -1 where fewer than `least` samples overlap."""
+    """Return the normalised cross-correlation over all shifts with enough overlap."""
     from scipy.signal import correlate  # noqa: PLC0415 - slow to import
 
     product, first, second = 0.0, 0.0, 0.0
@@ -106,7 +106,7 @@ _TWO_SIDED_95: Final = 1.96
 
 
 class Filter(NamedTuple):
-    """A low-pass filter without phase."""
+    """A zero-phase low-pass filter."""
 
     poles: int  # poles of both passes together
     steering_cut_off_Hz: float  # cut-off frequency of the steering wheel angle [Hz]
@@ -128,7 +128,7 @@ FILTERS: Final[dict[str, Filter | None]] = {
 
 
 def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float]:
-    """Return a filtered channel and the standard deviation of its noise, 0 if it cannot be estimated."""
+    """Return a filtered channel and the standard deviation of its noise, 0 if unknown."""
     # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
     # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
     # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
@@ -167,7 +167,7 @@ _CROSS_POINTS: Final = 1500
 
 
 class Tolerance(NamedTuple):
-    """Allowed difference from a simulated value: offset + gain x size of the value."""
+    """Tolerance of a quantity: offset + gain x magnitude of the simulated value."""
 
     offset: float  # constant part, SI
     gain: float  # fraction of the simulated value
@@ -338,7 +338,7 @@ def _crossed(
     name: str, tolerance: Tolerance, across: Array, measured: Array, confidence: Array,
     curve: tuple[Array, Array, Array], noise: float,
 ) -> Compared:  # fmt: skip
-    """Compare in a cross plot, where a point inside lies in the ellipse of both tolerances around a curve point."""
+    """Compare in a cross plot. A point is inside if it lies in the tolerance ellipse of a point of the curve."""
     rows, places = (
         np.unique(np.linspace(0, count - 1, min(count, _CROSS_POINTS)).astype(int))
         for count in (len(across), len(curve[0]))
@@ -353,7 +353,7 @@ def _crossed(
 
 
 def words(found: Compared) -> tuple[str, str, str, str, str]:
-    """Return channel, rms of the residual, tolerance, proportion inside and verdict as texts."""
+    """Return the cells of a channel: name, rms of the residual, tolerance, proportion inside, verdict."""
     shown = quantity_of(found.channel)
     unit, factor = shown.unit.name, shown.factor
     allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
@@ -368,7 +368,7 @@ def words(found: Compared) -> tuple[str, str, str, str, str]:
 
 
 def assumptions(found: Comparison) -> list[str]:
-    """Return the parts of the verdict that no standard defines, one line each."""
+    """Return the assumptions of the verdict that no standard defines, one line each."""
     assumed = [quantity_of(each.channel).label for each in found.quantities if each.tolerance.source == _ASSUMED]
     lines = [f"Tolerances of steering wheel angle and lateral acceleration {_QUOTED}."]
     if assumed:

@@ -29,7 +29,7 @@ standard deviation would be twice the range."""
 
 
 def autocorrelation_time(values: Array) -> float:
-    """Return the number of neighbouring samples equivalent to one independent sample, 1 for white noise.
+    """Return the autocorrelation time in samples, 1 for white noise.
 
     The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
     subtracted: an offset is no noise.
@@ -50,7 +50,7 @@ def autocorrelation_time(values: Array) -> float:
 def intervals(
     series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool
 ) -> tuple[Array, Array, tuple[float, ...], float]:
-    """Return the uncertainty of the parameters, relative to their ranges, by linearisation at the solution.
+    """Return the uncertainty of the parameters relative to their ranges, linearised at the solution.
 
     That is half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at
     an end of its range; the number of independent samples of each series; and the degrees of freedom of the t
@@ -90,7 +90,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
 
 
 def told_apart(slopes: Sequence[Array]) -> list[int]:
-    """Return parameters with a combination that has no effect, or empty if all can be separated."""
+    """Return the parameters that cannot be told apart, empty if there are none."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []
@@ -124,12 +124,12 @@ class Parameter(NamedTuple):
 
     @property
     def at_end(self) -> bool:
-        """True if the value is at an end of its range, and so has no interval."""
+        """True if the value is at an end of its range. It then has no interval."""
         return math.isnan(self.half_width)
 
     @property
     def words(self) -> str:
-        """Value and half width, with the significant digits of the latter."""
+        """Value and half width, rounded to the significant digits of the half width."""
         if self.at_end or self.half_width <= 0.0:
             return f"{self.value:.5g}"
         digits = max(0, 1 - math.floor(math.log10(self.half_width)))

@@ -1,4 +1,4 @@
-"""Fit of car parameters: recordings are driven again with their inputs until the differences are smallest.
+"""Fit of car parameters to recordings, which are driven again with their inputs.
 
 All values are relative: differences to the noise of their channel, parameters to their range, 0 to 1.
 """
@@ -85,7 +85,7 @@ _FEWEST: Final = 20
 
 
 class Measured(NamedTuple):
-    """Recording in the time of its manoeuvre."""
+    """Recording on the time axis of its manoeuvre."""
 
     name: str  # name of its file
     begin_s: float  # time of the recording at which the manoeuvre starts [s]
@@ -95,7 +95,7 @@ class Measured(NamedTuple):
 def measured_of(
     recording: Recording, name: str, study: StudyFile, table: FitTable, channels: Collection[str]
 ) -> Measured:
-    """Return the data of a recording that are compared."""
+    """Return the data of a recording for the comparison."""
     if not len(recording):
         raise RecordingError("has no rows", file=f"{name}.mcap")
     time_s = recording.time_s
@@ -159,7 +159,7 @@ def search(
     rounds: dict[bytes, tuple[list[Array], list[Array]] | str] = {}
 
     def tried(place: Array) -> tuple[list[Array], list[Array]] | str:
-        """Return differences and derivatives, or the reason why the parameters cannot be driven."""
+        """Return differences and derivatives, or the reason why the runs failed."""
         name = place.tobytes()
         if name not in rounds:
             rounds[name] = _tried(answers, place)
@@ -218,7 +218,7 @@ def fit(
     scheduler: str | None = None,
     progress: FitProgress = lambda *_: None,
 ) -> Fit:
-    """Find values of factors that match the car, driven by recorded inputs, best to recordings."""
+    """Find the values of factors that match a car best to recordings."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
@@ -349,7 +349,7 @@ class _Problem:
 def drive(
     settings: Settings, recording: int, overrides: dict[str, Any], times: dict[str, Array]
 ) -> dict[str, Array] | str:
-    """Drive once, and return channels at the times of a recording, or the reason for a failure."""
+    """Drive once, and return the compared channels, or the reason for a failure."""
     try:
         scenario = scenario_of(settings, recording, 0, overrides)
         run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
@@ -360,7 +360,7 @@ def drive(
 
 
 def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> float:
-    """Return the start of the search for a factor."""
+    """Return the start value of a factor."""
     if factor.key in table.start:
         return table.start[factor.key]
     if factor.nominal:

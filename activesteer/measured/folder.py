@@ -44,11 +44,11 @@ class Part(NamedTuple):
     band: tuple[Array, Array] | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return the part as JSON values, SI."""
+        """Return the comparison as JSON values, SI."""
         return {"run": self.run, "part": self.part, "stage": self.stage, **self.compared.to_json()}
 
     def box(self) -> dict[str, Any]:
-        """Return the mean width of the band, SI, and the share of measured samples in it, widened by the noise."""
+        """Return the mean width of the band [SI], and the share of measured samples in it."""
         assert self.band is not None
         one, (low, high) = self.compared, self.band
         inside = (one.measured >= low - one.noise) & (one.measured <= high + one.noise)
@@ -190,7 +190,7 @@ class _Case:
         scheduler: str | None,
         overrides: Mapping[str, Any] | None = None,
     ) -> Fit | None:
-        """Find factors in the fit windows, or None without factors."""
+        """Fit factors in the fit windows, or return None without factors."""
         if not keys:
             return None
         windows = {run: window for (run, part), window in self._windows.items() if part == "fit"}
@@ -246,7 +246,7 @@ def _cut(one: Compared, begin: float, end: float) -> Compared:
 def _at_end(
     case: _Case, free: list[str], start: Mapping[str, Any], end: dict[str, float]
 ) -> tuple[dict[str, float], list[Array]]:
-    """Return the free factors and the predictions in the check windows with one value at an end of its interval."""
+    """Return the predictions with one uncertain value at an end of its interval, and the refitted factors."""
     found = case.fit(free, case.file.predict_channels, start, 1, None, end)
     known = end | ({} if found is None else found.overrides)
     parts = case.parts("predicted", case.runs(known))
@@ -257,7 +257,7 @@ def _at_end(
 def _with_bands(
     file: MeasuredFile, parts: list[Part], beside: list[tuple[dict[str, float], list[Array]]]
 ) -> tuple[list[Part], tuple[End, ...]]:
-    """Return the parts, with bands if there are intervals, and the effect of each interval."""
+    """Return the comparisons, with bands if there are intervals, and the effect of each interval."""
     checked = [place for place, one in enumerate(parts) if one.part == "check" and one.stage == "predicted"]
     ends, effects = [], [dict[str, float]() for _ in file.table.intervals]
     for number, place in enumerate(checked if beside else ()):

@@ -1,4 +1,4 @@
-"""The file that describes a folder of measured runs, and example folders.
+"""The file `validation.toml` of a folder of measured runs, and example folders.
 
 The file stands in the folder of the measured files. Windows are times of these files.
 """
@@ -157,11 +157,11 @@ class MeasuredFile:
 
     @property
     def on_circle(self) -> dict[str, Any]:
-        """Car of the file on the measured circle: values of `CIRCLE_KEYS`, and overrides."""
+        """Nominal case of the measured circle: values of `CIRCLE_KEYS`, and overrides."""
         return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
     def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a case with overrides. A number that varies changes by its difference from the files."""
+        """Return a case with overrides, where varied numbers are changed by their difference from the files."""
         for change in changes:
             numbers = {key: self.nominal[key] for key in change if key in self.nominal}
             added = {key: case.get(key, own) + (change[key] - own) for key, own in numbers.items()}
@@ -169,7 +169,7 @@ class MeasuredFile:
         return case
 
     def drawn(self, case: dict[str, Any], draw: Array) -> dict[str, Any]:
-        """Return a case of another lap from standard normal numbers, one for each key of `circle.spread`."""
+        """Return a case of another lap, from standard normal numbers for the keys of `circle.spread`."""
         circle = self.table.circle
         assert circle is not None
         spreads = zip(circle.spread.items(), draw.tolist(), strict=True)
@@ -215,7 +215,7 @@ def _with_runs(file: MeasuredFile) -> MeasuredFile:
 
 
 def _with_circle(file: MeasuredFile, circle: CircleTable) -> MeasuredFile:
-    """Check circle and intervals, and turn the ends of a key into overrides."""
+    """Check circle and intervals, and convert the ends of each interval to overrides."""
     table, source = file.table, file.source
     if set(file.tolerances) != {STEERING}:
         raise source.fail(("quantities",), "a circle compares only steering_wheel_deg", list(table.quantities))
@@ -305,7 +305,7 @@ def _quantities(
 
 
 def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overrides: Mapping[str, Any]) -> Any:
-    """Return the value of a key of the car or of a repeated measurement. Without a key, only check the overrides."""
+    """Return the value of a key of the car or of a repeated measurement."""
     steering = {"time_s": [0.0, 1.0], "steering_wheel_rad": [0.0, 0.1]}
     inputs = {"kind": "open_loop", "name": "inputs", "duration_s": 1.0, "speed_mps": 20.0, "steering": steering}
     try:

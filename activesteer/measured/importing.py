@@ -1,4 +1,4 @@
-"""Import of measured data as a recording: columns become channels on a uniform time, by a map."""
+"""Import of measured data as a recording with channels on a uniform time axis."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def _found(name: str, files: _Files) -> tuple[Column, Path]:
 
 
 def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> dict[str, _Source]:
-    """Return the sources of channels by the map."""
+    """Return the sources of channels from the map."""
     sources = {}
     for name, given in chosen.channels.items():
         if name not in table and (channel := field_in_unit(name, table)[0]) is not None:
@@ -195,7 +195,7 @@ def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> di
 
 
 def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[str, _Source]:
-    """Return the sources of channels by the names of columns."""
+    """Return the sources of channels from the names of columns."""
     every = [(path, column) for path, columns in files.items() for column in columns]
     names = {column.name for _, column in every}
     channels = [*table, "brake_pedal"]
@@ -226,7 +226,7 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
 
 
 def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) -> dict[Path, Array]:
-    """Return the times that the columns of each file share [s], for files whose columns lack their own times."""
+    """Return the common times of the columns of each file, for columns without times of their own [s]."""
     if chosen.time and not lacking:
         raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
     named = [path for path in lacking if any(column.name == chosen.time for column in files[path])]
@@ -234,7 +234,7 @@ def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) ->
 
 
 def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, named: bool) -> Array:
-    """Return the times of a file [s], from the column that `time` of the map names or from its only time column."""
+    """Return the times of a file [s], from the column in the map or from its only time column."""
     if chosen.time and named:
         column = find(columns, chosen.time, path)
     else:
@@ -252,7 +252,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
 
 
 def known_time_unit(name: str) -> str:
-    """Return the unit in the name of a time column, by default s."""
+    """Return the unit in the name of a time column, s without one."""
     ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 
@@ -288,13 +288,13 @@ def _signal(name: str, source: _Source, time_s: Array, values: Array, chosen: Me
 
 
 def _plausible(values: Array, column: str, path: Path) -> Array:
-    """Return the values if a file may hold them."""
+    """Return the values if they are plausible for a file."""
     limits.check_numbers(values, RecordingError, infinite=True, file=path.name, key=f"column {shown(column)}")
     return values
 
 
 def _grid(sampled: Mapping[str, signals.Samples], chosen: MeasurementMap, path: Path) -> tuple[Array, float]:
-    """Return times of the file when all signals exist, and their step, the step of the fastest signal."""
+    """Return the uniform times at which all signals exist, with the step of the fastest signal."""
     times = [time_s for time_s, _ in sampled.values()]
     start, end = max(float(time_s[0]) for time_s in times), min(float(time_s[-1]) for time_s in times)
     step = chosen.step_s or min(float(np.median(np.diff(time_s))) for time_s in times)

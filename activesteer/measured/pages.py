@@ -56,7 +56,7 @@ def _cells(found: Compared) -> tuple[Text, ...]:
 
 
 def _shift(shift_s: float) -> str:
-    """Return a text on the delay of a measured run."""
+    """Describe the delay of a measured run."""
     if math.isnan(shift_s):
         return "by an unknown time later"
     return f"{1e3 * abs(shift_s):.1f} ms {'earlier' if shift_s < 0.0 else 'later'}"
@@ -65,7 +65,7 @@ def _shift(shift_s: float) -> str:
 def picture(
     found: Compared, standard: str = "iso19365", runs: int = 1, areas: Sequence[Area] = (), start: Array | None = None
 ) -> Picture:
-    """Return the overlay with its corridor and more areas, and the residual in the same corridor.
+    """Return the plots of a channel: overlay with its corridor, and residual.
 
     `start` has the simulated values at the start of a fit.
     """
@@ -251,7 +251,7 @@ def write_fit(found: Fit, name: str, folder: Path) -> list[Path]:
 
 
 def overrides_text(found: Fit, name: str) -> str:
-    """Return the file for `--overrides`. Values that hold in only one recording are comments."""
+    """Return the content of the file for `--overrides`. Values that hold in only one recording are comments."""
     words = {one.key: one.words if one.value == found.overrides.get(one.key) else f"{one.words}, relative to the files"
              for one in found.parameters}  # fmt: skip
     lines = [f"# Found by `activesteer fit {name}.toml`; for --overrides, or the table [overrides] of a study."]
@@ -289,7 +289,7 @@ def fit_page(found: Fit, name: str) -> Page:
 
 
 def _sentence(note: str) -> str:
-    """Return a note with a capital letter and a full stop, except for a note that starts with a key."""
+    """Format a note with a capital letter and a full stop, unless it starts with a key."""
     return f"{note if '.' in note.partition(' ')[0] else note[0].upper() + note[1:]}."
 
 
@@ -316,7 +316,7 @@ def _correlation_table(found: Fit) -> Table:
 
 
 def _fit_picture(found: FitCompared) -> Picture:
-    """Return the overlay and the difference of a channel of a recording, with twice its noise as the corridor."""
+    """Return the plots of a fitted channel: overlay, and difference with twice its noise as the corridor."""
     start, end = (found.measured + found.noise * each for each in (found.before, found.after))
     twice = Tolerance(2.0 * found.noise, 0.0, "")
     low, high = end - twice.offset, end + twice.offset

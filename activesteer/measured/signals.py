@@ -1,4 +1,4 @@
-"""Measured signals: names, units and axes, suspicious values, resampling, and the path of the car."""
+"""Measured signals: names, units and axes, suspicious values, resampling, and path."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def by_channel(
 
 
 def written_unit(unit: str) -> Unit | None:
-    """Return a unit as a file writes it, or None if it is unknown."""
+    """Return a unit from its spelling in a file, None if unknown."""
     return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
 
 
 def bracketed(name: str) -> tuple[str, str]:
-    """Split a name and the text in brackets behind it, or return an empty text without brackets."""
+    """Split a name and the string in brackets behind it, empty without brackets."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     return (found[1], found[2]) if found else (name, "")
 
@@ -59,12 +59,12 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def is_time(name: str) -> bool:
-    """Return whether a column is named like a time."""
+    """Return whether the name of a column is the name of a time."""
     return name == "time_s" or _word(split_unit(name)[0]) in _NAMES["time"].split()
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> tuple[str, str, float, bool] | None:
-    """Return the meaning of a column by its name, the names of all columns and the channels of a car, or None.
+    """Return the channel that a column means by its name, or None.
 
     That is the channel that it fills, its unit if the file states none, -1 if the exporter uses the sign opposite to
     ISO 8855, and whether the unit is the exporter's; otherwise SI is assumed.
@@ -114,7 +114,7 @@ _FASTEST_RADPS: Final = 4.0
 
 
 def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]:
-    """Return signs of a wrong unit or sign, one line each."""
+    """Return hints of wrong units or signs, one line each."""
     rate, ay, wheel = (channels.get(name) for name in ("yaw_rate_radps", "ay_mps2", "steering_wheel_rad"))
     speed = channels.get("speed_mps", channels.get("vx_mps"))
     found: list[str] = []
@@ -157,7 +157,7 @@ def _against_acceleration(product: Array, ay: Array, wheel: Array | None) -> lis
 
 
 def _unit_words(ratio: float) -> list[str]:
-    """Explain the ratio of lateral acceleration to speed x yaw rate by the fewest wrong units."""
+    """Explain a wrong ratio of lateral acceleration to speed x yaw rate by the fewest wrong units."""
     if abs(math.log(ratio)) < _NEAR:
         return []
     guesses = []
@@ -201,7 +201,7 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
 
 
 def _alike(one: Array, other: Array) -> float:
-    """Return the cosine between two signals, or 0 if one of them is zero."""
+    """Return the cosine between two signals, 0 if one of them is zero."""
     size = math.sqrt(float(one @ one) * float(other @ other))
     return float(one @ other) / size if size > 0.0 else 0.0
 
@@ -211,7 +211,7 @@ Samples = tuple[Array, Array]
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in the order of time. Of several samples at one time, keep the last."""
+    """Return the finite samples in order of time, with the last sample of equal times."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file
@@ -233,7 +233,7 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
 
 
 def resampled(signal: Samples, grid_s: Array) -> Array:
-    """Resample a signal to a uniform grid, with straight lines between samples."""
+    """Resample a signal to a uniform grid by linear interpolation."""
     # If the samples are closer than the grid, their mean over a grid step is taken, which prevents aliasing.
     time_s, measured = signal
     step_s = float(grid_s[1] - grid_s[0])
@@ -279,7 +279,7 @@ def _sideslip(vx: Array, vy: Array) -> Array:
 
 
 def at_sensor(run: Recording) -> Recording:
-    """Return the motion of the point `sensor_ahead_m` of the manoeuvre, with the offsets in `sensor_offset`."""
+    """Return the motion at the sensors, at `sensor_ahead_m`, with the offsets in `sensor_offset`."""
     # The point is on the centre line of a rigid body, ahead of the centre of gravity by x: v_y + x r, a_y + x dr/dt,
     # a_x - x r^2 with the yaw rate r.
     maneuver = run.metadata.get("maneuver", {})
@@ -301,7 +301,7 @@ def at_sensor(run: Recording) -> Recording:
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """Return poses of a car in its design position, moved along the path, for replay, or None without a path."""
+    """Return the poses of a car along the path for replay, None without a path."""
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import

@@ -41,7 +41,7 @@ _PACKAGE: Final = Path(__file__).parents[1]
 
 
 def _import_array_functions() -> None:
-    """Let numba import its array functions without scipy.linalg, which takes longer than all of them.
+    """Let numba import its array functions without scipy.linalg, whose import is slow.
 
     numba only checks here whether it exists, and checks again when it compiles something that needs it.
     """
@@ -69,7 +69,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Make native code of a function part of each compiled function that calls it (a decorator)."""
+    """Decorator: inline a function into each compiled function that calls it."""
     _know_shared()
     return njit(inline="always", error_model="numpy")(function)
 
@@ -81,7 +81,7 @@ def _know_shared() -> None:
 
 
 def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[Callable[..., Any]], CFunc]:
-    """Return a decorator that compiles a function now to a C function for the engine, and keeps it on disk."""
+    """Return a decorator that compiles a function to a C callback for the engine, and keeps it on disk."""
 
     def decorate(function: Callable[..., Any]) -> CFunc:
         _know_shared()
@@ -96,7 +96,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 def compiled_call(
     result: types.Type, *arguments: types.Type, others_run: bool = True, about: tuple[str, Path] | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles a function now to native code with one signature.
+    """Return a decorator that compiles a function to native code with one signature.
 
     Call it from Python only, with positional arguments; it does not inspect their types first.
     """
@@ -119,12 +119,12 @@ _ADDRESSES: Final[dict[Any, int]] = {}
 
 
 def address_of(call: Any) -> int:
-    """Return the address of a `compiled_call` for `call_at`, or 0 where numba is switched off."""
+    """Return the address of a `compiled_call` for `call_at`, 0 if numba is switched off."""
     return _ADDRESSES.get(call, 0)
 
 
 def call_at(result: types.Type, *arguments: types.Type) -> Any:
-    """Return an intrinsic: address and arguments of a `compiled_call` of these types -> its result.
+    """Return an intrinsic that calls a `compiled_call` at an address.
 
     The caller does not contain the code that it calls, so neither is compiled again when the other changes.
     """
@@ -146,7 +146,7 @@ def call_at(result: types.Type, *arguments: types.Type) -> Any:
 
 
 class _ContentCache(FunctionCache):
-    """Cache of numba for one function, under a name with the content key of all its sources."""
+    """Cache of numba for one function, keyed by the content of all its sources."""
 
     def __init__(self, function: Callable[..., Any], about: tuple[str, Path] | None = None) -> None:
         super().__init__(function)
@@ -202,7 +202,7 @@ def _say_uncached() -> None:
 
 
 def content_key(source: Path) -> str:
-    """Return a key of the code compiled from a file: all sources behind it, and the versions of the compilers."""
+    """Return a key of compiled code: all its sources, and the versions of the compilers."""
     return hashlib.sha256(f"{_versions()}\n{_sources_key(source)}".encode()).hexdigest()
 
 
@@ -249,7 +249,7 @@ def _content(file: Path) -> bytes:
 
 @functools.cache
 def _imported(file: Path, package: Path) -> tuple[Path, ...]:
-    """Return the files of the package that a file imports, and the table with its name next to it."""
+    """Return the files of the package that a file imports, and the table of the same name."""
     if file.suffix != ".py":
         return ()
     table = file.with_suffix(".txt")

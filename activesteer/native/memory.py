@@ -1,4 +1,4 @@
-"""Memory, messages and controllers in compiled code: addresses, rows of records, laws called by their address."""
+"""Memory, messages and controllers in compiled code, accessed by their addresses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from activesteer.native.records import NativeBlock, record_type, table
 
 
 def pointer_to(numba_type: types.Type) -> Any:
-    """Return an intrinsic: address (intp) -> pointer to a type."""
+    """Return an intrinsic that converts an address to a pointer."""
 
     @intrinsic
     def cast(_typing_context, _address):
@@ -55,7 +55,7 @@ def array_of(memory):
 
 @overload(table)
 def _table(numbers):
-    """Let a law that Python and compiled code share read the numbers of a block."""
+    """Let a shared law read the numbers of a block."""
     if isinstance(numbers, types.Record):
         return lambda numbers: array_of(numbers)  # noqa: PLW0108 - numba asks for a function of Python
     return None
@@ -74,7 +74,7 @@ def array_at(struct, offset, size):
 
 
 def records_at(kind: np.dtype[Any]) -> Any:
-    """Return compiled code: address, distance from it in numbers, count -> array of records of float64."""
+    """Return compiled code that views memory as an array of float64 records."""
     pointer = pointer_to(from_dtype(kind))
 
     @inlined
@@ -85,7 +85,7 @@ def records_at(kind: np.dtype[Any]) -> Any:
 
 
 def message_pointer(message: type[Any]) -> Any:
-    """Return an intrinsic: address (intp) -> pointer to the numbers of a message, by the names of its fields."""
+    """Return an intrinsic that converts an address to a pointer to the numbers of a message."""
     return pointer_to(from_dtype(np.dtype((np.record, record_fields(message)))))
 
 
@@ -97,7 +97,7 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """The type of a message from Python in compiled code.
+    """Numba type of a message from Python.
 
     Every number is converted to float64. Check class and length of a message first: one that is too short ends the
     process.
@@ -107,7 +107,7 @@ def native_type(message: type[Any]) -> types.Tuple:
 
 
 def _places(kind: Any) -> list[tuple[int, ...]]:
-    """Indices of the numbers of a tuple and of the tuples within it, one after the other."""
+    """Indices of all numbers of a nested tuple, in order."""
     places: list[tuple[int, ...]] = []
     for index, part in enumerate(kind):
         if isinstance(part, types.BaseTuple):
@@ -152,7 +152,7 @@ call_law: Final = call_at(types.void, *CALL)
 
 
 def law_address(controller: Any) -> int:
-    """Return the address of the compiled law of a controller, or 0 if it has none or its `step` is watched."""
+    """Return the address of the compiled law of a controller, 0 if it has none or its `step` is watched."""
     if not isinstance(controller, NativeBlock) or controller.is_watched:
         return 0
     kind = type(controller)

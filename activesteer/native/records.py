@@ -1,4 +1,4 @@
-"""Records of numbers and blocks of parameters, as compiled code reads them.
+"""Records of numbers, and blocks of parameters for compiled code.
 
 The law of such a block is a function whose first argument is the block (`compilation.shared`). Python passes the
 object, compiled code passes its record. There is one law, and both results are equal to the last bit.
@@ -23,7 +23,7 @@ else:
 
 
 def numbers_type(*fields: str | tuple[str, int], words: Iterable[str] = ()) -> np.dtype[Any]:
-    """Return a record type of numbers, and of rows of numbers where a length is given."""
+    """Return a record type of numbers, or of arrays where a length is given."""
     rows = [(field, np.float64) if isinstance(field, str) else (field[0], np.float64, (field[1],)) for field in fields]
     return np.dtype((np.record, [*((name, np.intp) for name in words), *rows]))
 
@@ -34,7 +34,7 @@ _NUMBERS: Final = {float: np.dtype(np.float64), int: np.dtype(np.intp), bool: np
 
 
 class NativeBlock:
-    """Base of a block with a record: every attribute that the class annotates is part of it.
+    """Base of a block with a record of all attributes that the class annotates.
 
     An annotation is `float`, `int`, `bool`, `PerWheel`, another such block, an array of float64 or records, or
     `Table`, whose numbers Python reads faster one by one; see `table`.
@@ -43,19 +43,19 @@ class NativeBlock:
     _written_step: ClassVar[Any] = None
 
     def __init_subclass__(cls, **given: Any) -> None:
-        """Remember the method `step` as it is written."""
+        """Store the original method `step`."""
         super().__init_subclass__(**given)
         cls._written_step = getattr(cls, "step", None)
 
     @property
     def is_watched(self) -> bool:
-        """True if the method `step` is replaced, for example to watch it, so that compiled code stays away."""
+        """True if the method `step` is replaced, for example to watch it."""
         kind: Any = type(self)
         return "step" in vars(self) or kind.step is not kind._written_step
 
 
 def table(numbers: Table) -> Table:
-    """Return a block's numbers, whose memory compiled code reads as a record (`native.memory`)."""
+    """Return the record of a block, whose memory compiled code reads."""
     return numbers
 
 
@@ -81,7 +81,7 @@ def record_type(kind: type[NativeBlock]) -> np.dtype[Any]:
 
 
 def values(block: NativeBlock) -> tuple[Any, ...]:
-    """Return the attributes of a block as its record takes them, in memory that the block owns."""
+    """Return the attributes of a block in the form of its record."""
     found: list[Any] = []
     for name in _members(type(block)):
         value = getattr(block, name)
@@ -98,7 +98,7 @@ def values(block: NativeBlock) -> tuple[Any, ...]:
 
 
 def take(block: NativeBlock, record: tuple[Any, ...]) -> None:
-    """Give a block the attributes of its record, as a tuple (see `values`)."""
+    """Set the attributes of a block from its record (see `values`)."""
     for (name, hint), value in zip(_members(type(block)).items(), record, strict=True):
         if hint in _NUMBERS:
             setattr(block, name, hint(value))

@@ -1,4 +1,4 @@
-"""HTML pages that need no other file and no network, from one jinja2 template and one stylesheet.
+"""Self-contained HTML pages, from one jinja2 template and one stylesheet.
 
 In: tables, pictures and texts.
 Out: HTML pages that work without a network.
@@ -56,7 +56,7 @@ def _typeset(text: Text) -> Text:
 
 
 def _asset(name: str) -> Markup:
-    """Return a stylesheet or a script as it is."""
+    """Return the content of a stylesheet or a script."""
     loader = PackageLoader("activesteer.pages")
     return Markup(loader.get_source(_environment(), name)[0])
 

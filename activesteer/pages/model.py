@@ -1,4 +1,4 @@
-"""Parts of a page that is read from top to bottom: texts, tables, points and figures in sections."""
+"""Parts of a page: paragraphs, tables, points and figures, in sections."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _GREY: Final = "#777777"
 
 
 def picture_values(picture: Picture) -> dict[str, Any]:
-    """Return a picture as JSON values.
+    """Return a figure as JSON values.
 
     A panel without a label of its abscissa, ordinate or without a title has those of its column or row.
     """
@@ -85,12 +85,12 @@ def _curve_values(curve: Curve, colour: str, dashes: Any) -> dict[str, Any]:
 
 
 def _colour(colour: str) -> str:
-    """Return the name of a run's colour, which a page has for day and night, or the colour itself."""
+    """Return the page's name of a run colour, for light and dark mode, or the colour itself."""
     return f"run-{RUN_COLOURS.index(colour)}" if colour in RUN_COLOURS else colour if len(colour) == 7 else _GREY
 
 
 def _extremes(y: Array) -> NDArray[np.intp]:
-    """Return the places of the extreme values in equal parts of a long curve, so that no peak is lost."""
+    """Return the indices of the extreme values in equal stretches of a long curve."""
     edges = np.linspace(0, len(y), _MOST_POINTS // 2 + 1).astype(int)
     low, high = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
     places = [
@@ -101,7 +101,7 @@ def _extremes(y: Array) -> NDArray[np.intp]:
 
 
 def _numbers(values: ArrayLike, along: ArrayLike | None = None) -> list[float | None]:
-    """Return numbers with five digits, thinned if there are too many, or None for values that are not finite."""
+    """Thin numbers and round them to five digits, with None for values that are not finite."""
     each = np.asarray(values, np.float64)
     if along is not None:
         each = np.broadcast_to(each, np.shape(along))
@@ -153,7 +153,7 @@ class Table(NamedTuple):
 
     @property
     def cards(self) -> bool:
-        """True if a phone shows each row as a card, because the table is too wide."""
+        """True for a wide table, whose rows become cards on a phone."""
         if self.kind == "contents":  # its rows belong together
             return False
         cells = [_plain(cell) for row in self.rows for cell in row]
@@ -163,13 +163,13 @@ class Table(NamedTuple):
 
     @property
     def number_columns(self) -> frozenset[int]:
-        """Places of the columns that are aligned to the right: the last `numbers`, and others with only numbers."""
+        """Indices of the right-aligned columns: the last `numbers` columns, and numeric columns."""
         columns = [[_plain(cell) for cell in column] for column in zip(*self.rows, strict=True)]
         found = {place for place, column in enumerate(columns) if place and all(map(_NUMBER.fullmatch, column))}
         return frozenset(found.union(range(len(self.columns) - self.numbers, len(self.columns))))
 
     def lines(self) -> Iterator[str]:
-        """Yield the table as aligned text, with `!` for rows that break a limit, `~` for rows without one."""
+        """Yield the table as aligned lines. `!` marks rows that break a limit, `~` rows without one."""
         rows = [[_plain(cell) for cell in row] for row in (self.columns, *self.rows)]
         places = range(-1, len(self.rows))
         marks = ["! " if place in self.outside else "~ " if place in self.quiet else "  " for place in places]
@@ -224,7 +224,7 @@ class Page(NamedTuple):
     data: Mapping[str, Any] = MappingProxyType({})
 
     def lines(self) -> Iterator[str]:
-        """Yield heading, paragraphs and tables as text."""
+        """Yield heading, paragraphs and tables as lines."""
         for text in map(_plain, (self.heading, *self.lead)):
             yield from wrapped_line(text)
         for section in self.sections:
@@ -236,17 +236,17 @@ class Page(NamedTuple):
 
 
 def _plain(text: Text) -> str:
-    """Return a text without markup, ticks and crosses."""
+    """Remove markup, ticks and crosses from a string."""
     if isinstance(text, Markup):
         text = Markup(str(text).replace("<br>", ", ")).striptags()
     return re.sub("[\N{CHECK MARK}\N{BALLOT X}] ", "", text)
 
 
 def passed(words: str, *, chip: bool = False) -> Markup:
-    """Return words with a tick."""
+    """Return a string with a tick."""
     return Markup('<b class="{}passed">\N{CHECK MARK} {}</b>').format("chip " if chip else "", words)
 
 
 def failed(words: str, *, chip: bool = False) -> Markup:
-    """Return words with a cross."""
+    """Return a string with a cross."""
     return Markup('<b class="{}failed">\N{BALLOT X} {}</b>').format("chip " if chip else "", words)

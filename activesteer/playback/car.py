@@ -46,7 +46,7 @@ def xyzw(quaternions: ArrayLike) -> Array:
 
 
 def between(start_m: Array, end_m: Array) -> tuple[Array, Array, Array]:
-    """Return length [m], centre [m] and quaternion x y z w of a solid whose z axis is the line between two points."""
+    """Return length [m], centre [m] and orientation x y z w of a solid along the line between two points."""
     if end_m[0, 2] < start_m[0, 2]:  # point upwards: close to straight down, the shortest rotation has no definite axis
         start_m, end_m = end_m, start_m
     along = end_m - start_m
@@ -89,7 +89,7 @@ def link_ends(run: ReplayedRun, link: Link) -> list[NDArray[np.float64]]:
 
 
 def _send_rods(stream: rr.RecordingStream, run: ReplayedRun, links: list[Link]) -> None:
-    """Send all springs in one entity, because there are many and each changes at every pose."""
+    """Send all springs in one entity, because each of them changes at every pose."""
     parts = []
     radii: list[float] = []
     colours: list[list[int]] = []
@@ -125,7 +125,7 @@ def _send_spring(stream: rr.RecordingStream, run: ReplayedRun, spring: Link) -> 
 
 
 def _coil(radius_m: float) -> NDArray[np.float64]:
-    """Return a helix about z of length one, with its middle at the origin."""
+    """Return a helix about z of unit length, centred at the origin."""
     turn = np.linspace(0.0, 2.0 * np.pi * _COILS, _COILS * _POINTS_PER_COIL + 1)
     height = np.linspace(-0.5, 0.5, len(turn))
     return np.stack([radius_m * np.cos(turn), radius_m * np.sin(turn), height], axis=1)
@@ -143,7 +143,7 @@ _USED: Final = tuple(f"{corner}_friction_utilisation" for corner in CORNERS)
 
 
 def send_tyre_forces(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequence[ReplayedRun]) -> None:
-    """Send an arrow and a disc for each tyre, unless the recording lacks a channel that they need."""
+    """Send an arrow and a disc for each tyre, if the recording has their channels."""
     if not run.has(*_USED, *CHANNELS):
         return
     origins, vectors = force_arrows(run.recording, force_scale([other.recording for other in runs]))
@@ -161,7 +161,7 @@ def send_tyre_forces(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequenc
 
 
 def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """Return colours 0xrrggbbff for fractions of the available friction."""
+    """Return the colours of used fractions of the friction."""
     red, green, blue = (
         np.interp(np.nan_to_num(friction_utilisation, nan=0.0), _USE, [colour[part] for colour in _USE_COLOURS])
         .round()
@@ -179,7 +179,7 @@ _CUTAWAY_OPACITY: Final = 0.25
 
 
 def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = False) -> None:
-    """Send bodies, their solids, and two level frames that move with the car.
+    """Send the bodies with their solids, and two level frames that move with the car.
 
     `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
     """
@@ -213,12 +213,12 @@ def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = Fa
 
 
 def body_path(run: ReplayedRun, body: str) -> str:
-    """Return the entity of a body, which moves all entities below it."""
+    """Return the entity of a body, the parent of all entities of the body."""
     return f"{run.scene}/car/{body}"
 
 
 def send_ghost(stream: rr.RecordingStream, run: ReplayedRun, beside: ReplayedRun) -> None:
-    """Send the body of a car for the view of another run. It is more transparent near the other car."""
+    """Send a car as a ghost for the view of another run, more transparent near the other car."""
     poses = run.recording.poses
     time_s = poses.time_s[run.poses][::_GHOST_EVERY]
     alpha = np.rint(255.0 * _GHOST_OPACITY * share_seen(_apart(run, beside, time_s))).astype(np.uint32)
@@ -238,7 +238,7 @@ def ghost_path(run: ReplayedRun, beside: ReplayedRun) -> str:
 
 
 def _apart(run: ReplayedRun, other: ReplayedRun, time_s: Array) -> Array:
-    """Return the distance between the chassis of two runs [m], after the end of a run from its last position."""
+    """Return the distance between the chassis of two runs [m], with the last position held after the end of a run."""
     at = []
     for each in (run, other):
         poses = each.recording.poses

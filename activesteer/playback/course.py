@@ -64,7 +64,7 @@ def extent(runs: Sequence[ReplayedRun]) -> Extent:
 
 
 def send_road(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
-    """Send the road with its grid and its patches of other friction."""
+    """Send the road with its grid and its friction patches."""
     around = extent(runs)
     low_x = np.floor((around.low_x_m - _BEYOND_M / 2) / _TILE_M) * _TILE_M
     high_x = np.ceil((around.high_x_m + _BEYOND_M) / _TILE_M) * _TILE_M
@@ -95,7 +95,7 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
 
 
 def send_course(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
-    """Send lanes, cones and path if the manoeuvre has them."""
+    """Send lanes, cones and path of the manoeuvre, if it has them."""
     course = _course(runs)
     if course is None:
         return
@@ -143,7 +143,7 @@ def send_track(stream: rr.RecordingStream, run: ReplayedRun, number: int) -> Non
 
 
 def _outline(run: ReplayedRun) -> Array:
-    """Return the sides of the car and a stroke for each wheel on the map, shape (poses, strokes, 2 points, 2)."""
+    """Return the lines of the car on the map, its sides and a stroke for each wheel, shape (poses, strokes, 2, 2)."""
     poses, car = run.recording.poses, footprint_of(run.recording.metadata) or Footprint()
     half, front, rear = 0.5 * car.width_m, car.front_m, car.rear_m
     chassis = poses.names.index(CHASSIS)
@@ -167,7 +167,7 @@ def _outline(run: ReplayedRun) -> Array:
 
 
 def _track(run: ReplayedRun) -> Array:
-    """Return the track of the centre of gravity, or of the chassis origin if only this was recorded."""
+    """Return the track of the centre of gravity, or of the chassis origin if only this is recorded."""
     poses = run.recording.poses
     at = poses.positions_m[run.poses, poses.names.index(CHASSIS), :2]
     if not run.has("x_m", "y_m"):
@@ -186,7 +186,7 @@ def _path(course: Course) -> Array:
 
 
 def _flat(points: Array) -> Array:
-    """Convert world to map coordinates: the second axis of the map points down, and left is shown upwards."""
+    """Convert world to map coordinates. The second axis of the map points down, so that left is up."""
     return points * (1.0, -1.0)
 
 
@@ -198,7 +198,7 @@ def map_bounds(runs: Sequence[ReplayedRun]) -> tuple[tuple[float, float], tuple[
 
 
 def _points(radius: float) -> Any:
-    """Return a radius in screen points, so that lines stay visible at every zoom of the map."""
+    """Return a radius in screen points, so that lines stay visible at any zoom of the map."""
     return rr.Radius.ui_points(radius)
 
 
@@ -207,7 +207,7 @@ def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, c
 
 
 def _quadrangles(corners: Array, z: float, colour: tuple[int, int, int]) -> Any:
-    """Return quadrangles, with corners of shape (n, 4, 2), at a height as one mesh."""
+    """Return quadrangles at a height as one mesh, from corners of shape (n, 4, 2)."""
     flat = corners.reshape(-1, 2)
     triangles = 4 * np.arange(len(corners))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return rr.Mesh3D(

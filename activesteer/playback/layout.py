@@ -33,7 +33,7 @@ _BELOW: Final = 12.0
 
 
 def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
-    """Return the view of a legend."""
+    """Return a legend as a view."""
     return rrb.Spatial2DView(
         origin=f"/{path}",
         name=f"Curves: {path.removeprefix(LEGEND)[1:]}",
@@ -43,12 +43,12 @@ def legend(path: str, curves: Mapping[str, str]) -> rrb.Spatial2DView:
 
 
 def height(curves: Mapping[str, str]) -> float:
-    """Return the height of the legend of some curves."""
+    """Return the height of a legend."""
     return _ROW * (1 + max((row for row, _ in _places(curves)), default=0))
 
 
 def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]) -> None:
-    """Send the legend of some curves: names and colours."""
+    """Send a legend: names and colours."""
     points = rr.Points2D(
         [(middle, (row + 0.5) * _ROW - _BELOW) for row, middle in _places(curves)],
         labels=list(curves),
@@ -60,7 +60,7 @@ def send_legend(stream: rr.RecordingStream, path: str, curves: Mapping[str, str]
 
 
 def _places(curves: Mapping[str, str]) -> list[tuple[int, float]]:
-    """Return the row and the middle of each name."""
+    """Return the row and the centre of each name."""
     places, row, at = [], 0, 0.0
     for name in curves:
         wide = _LETTER * len(name) + _GAP
@@ -77,7 +77,7 @@ _SHORTEST_S: Final = 0.05
 
 
 class Event(NamedTuple):
-    """A begin or an end of a fault or a saturation, or a recorded event."""
+    """Start or end of a fault or a saturation, or a recorded event."""
 
     time_s: float
     text: str
@@ -144,7 +144,7 @@ def send_events(stream: rr.RecordingStream, run: ReplayedRun) -> None:
 
 
 def warnings_view(runs: Sequence[ReplayedRun]) -> list[rrb.TextLogView]:
-    """Return the view of the warnings of these runs, or None if there are none."""
+    """Return a list with the view of the warnings, empty if no run has any."""
     paths = [f"/{_warnings_path(run)}" for run in runs if events(run)]
     return [rrb.TextLogView(origin="/", contents=paths, name="Warnings")] if paths else []
 
@@ -277,7 +277,7 @@ def _map(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
 
 
 def _words(runs: Sequence[ReplayedRun]) -> rrb.Tabs | rrb.TextDocumentView:
-    """Return the view of the summary, with the warnings behind it if there are any."""
+    """Return the views of the summary and of the warnings, if there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
     warnings = warnings_view(runs)
     return rrb.Tabs(summary, *warnings, active_tab=0) if warnings else summary

@@ -63,7 +63,7 @@ def _paint(run: ReplayedRun, line: Line, *, alone: bool) -> str:
 
 
 def _entities(run: ReplayedRun, plot: Panel) -> list[tuple[str, list[Line]]]:
-    """Return the entities of a plot and the lines in each, for the channels that a run has."""
+    """Return the entities of a plot and their lines, for the channels of a run."""
     lines = [line for line in plot.lines_in(MOTION) if run.has(line.channel) and line.of(run.recording) is not None]
     if plot.joined:
         return [(f"{run.name}/plots/{_entity(plot)}", lines)] if lines else []
@@ -71,7 +71,7 @@ def _entities(run: ReplayedRun, plot: Panel) -> list[tuple[str, list[Line]]]:
 
 
 def _entity(plot: Panel) -> str:
-    """Return the name of the entity that holds all lines of a plot."""
+    """Return the entity name of all lines of a plot."""
     channel = plot.lines[0].channel
     return f"{channel[:2]}_link_forces_N" if channel.endswith("_force_N") else channel[3:]
 
@@ -82,7 +82,7 @@ def pages(run: ReplayedRun) -> dict[str, tuple[Panel, ...]]:
 
 
 def curves(plots: Sequence[Panel], run: ReplayedRun, *, alone: bool) -> dict[str, str]:
-    """Return the names and colours of the lines of a run."""
+    """Return the legend of the lines of a run: names and colours."""
     found = {}
     for plot in plots:
         own = alone or plot not in OF_CAR
@@ -92,7 +92,7 @@ def curves(plots: Sequence[Panel], run: ReplayedRun, *, alone: bool) -> dict[str
 
 
 def views(plots: Sequence[Panel], runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
-    """Return a view for each plot that has data, with the lines of all these runs."""
+    """Return a view for each plot that has data, with the lines of all runs."""
     shown = []
     found = [(plot, [entity for run in runs for entity in _entities(run, plot)]) for plot in plots]
     filled = [(plot, entities) for plot, entities in found if entities]
@@ -103,7 +103,7 @@ def views(plots: Sequence[Panel], runs: Sequence[ReplayedRun]) -> list[rrb.TimeS
 
 
 def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float, float]:
-    """Return the range of an axis from a few fixed ranges, so that most runs share it."""
+    """Return an axis range from a few fixed ranges, so that most runs share it."""
     values = [
         run.channel(line.channel) * plot.quantity.factor
         for run in runs
@@ -117,7 +117,7 @@ def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return a range with zero and with at least three tick labels in the viewer.
+    """Return an axis range with zero and at least three tick labels in the viewer.
 
     The viewer labels multiples of one power of ten if they are at least 22 points apart.
     """
@@ -143,7 +143,7 @@ def axis_range(low: float, high: float, least: float, most: float) -> tuple[floa
 
 
 def views_by_corner(plot: Panel, runs: Sequence[ReplayedRun]) -> list[rrb.TimeSeriesView]:
-    """Return a view for each wheel of a wheel plot, with each run's lines in the colour of the run."""
+    """Return a view for each wheel of a plot, with each run in its own colour."""
     shown = []
     for line in plot.lines:
         present = [run for run in runs if run.has(line.channel)]

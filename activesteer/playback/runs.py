@@ -20,12 +20,12 @@ TIMELINE: Final = "time"
 
 
 def times(time_s: NDArray[np.float64]) -> list[rr.TimeColumn]:
-    """Return the time index of columns."""
+    """Return times as the time index of columns."""
     return [rr.TimeColumn(TIMELINE, duration=np.rint(time_s * 1e9).astype("timedelta64[ns]"))]
 
 
 def send(stream: rr.RecordingStream, path: str, style: Any, time_s: Array, columns: Any, each: int) -> None:
-    """Send the static style of an entity, and its values over time in groups of `each`."""
+    """Send the style of an entity, and its values over time in groups of `each`."""
     stream.log(path, style, static=True)
     stream.send_columns(path, times(time_s), columns.partition(lengths=[each] * len(time_s)))
 
@@ -53,7 +53,7 @@ _GREY: Final = "#8d939c"
 
 
 class ReplayedRun(NamedTuple):
-    """A recording as the viewer shows it.
+    """A recording in the viewer.
 
     Attributes:
         recording: The recording, with the rows that are shown: about `PLOT_RATE_HZ` per second.
@@ -77,7 +77,7 @@ class ReplayedRun(NamedTuple):
         return f"{self.name}/scene"
 
     def channel(self, name: str) -> NDArray[np.float64]:
-        """Return a channel at the rows that are shown."""
+        """Return a channel at the displayed rows."""
         return self.recording[name]
 
     def has(self, *names: str) -> bool:
@@ -114,7 +114,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[ReplayedRun]:
 
 
 def _shown(time_s: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return every n-th row and the last one, with n such that a second has `PLOT_RATE_HZ` rows."""
+    """Thin rows to about `PLOT_RATE_HZ` per second, and keep the last one."""
     span_s = float(time_s[-1] - time_s[0])
     step = max(1, round((len(time_s) - 1) / (span_s * PLOT_RATE_HZ))) if span_s > 0.0 else 1
     rows = np.arange(0, len(time_s), step)

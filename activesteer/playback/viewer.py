@@ -28,7 +28,7 @@ from activesteer.playback.wheel_angles import send_wheel_angles
 
 
 def new_stream(runs: Sequence[ReplayedRun], *, compare: bool) -> rr.RecordingStream:
-    """Return a stream that has no target yet.
+    """Return a stream without a target.
 
     The viewer keeps one layout for each application id while it is open. Another manoeuvre or other runs need another
     layout, so they have another id.
@@ -69,7 +69,7 @@ def fill(stream: rr.RecordingStream, runs: Sequence[ReplayedRun], layout: rrb.Bl
 
 
 def summary(runs: Sequence[ReplayedRun], verdict: Sequence[str] = ()) -> str:
-    """Return a page in Markdown: scenario, results, metrics side by side, systems."""
+    """Return a Markdown page with scenario, results, metrics side by side, and systems."""
     lines: list[str] = []
     for text in dict.fromkeys(_scenario(run.recording.metadata) for run in runs):
         lines += [f"**{text}**", ""]
@@ -222,7 +222,7 @@ def _run_viewer(
 
 
 def viewer_binary() -> Path:
-    """Return the viewer that rerun-sdk installs, regardless of the command `rerun` on the path."""
+    """Return the viewer of the package rerun-sdk, regardless of any command `rerun` on the path."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is not None and spec.origin is not None:
         binary = Path(spec.origin).with_name("rerun.exe" if os.name == "nt" else "rerun")

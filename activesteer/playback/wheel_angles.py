@@ -39,7 +39,7 @@ _RAYS: Final = range(1, SLICES + 2, 2)
 
 
 def send_wheel_angles(stream: rr.RecordingStream, run: ReplayedRun, runs: Sequence[ReplayedRun]) -> None:
-    """Send the wedges and the plan of a run, unless the recording has no wheel angles."""
+    """Send the wedges and the plan view of a run, if the recording has the wheel angles."""
     if not run.has(*CHANNELS):
         return
     recording, size = run.recording, footprint_of(run.recording.metadata) or Footprint()
@@ -111,7 +111,7 @@ def _send_plan(
     size: Footprint,
 ) -> None:
     def placed(points_m: Array) -> Any:
-        """Convert to view coordinates with the front of the car up: the second axis of the view points down."""
+        """Convert to view coordinates: front of the car up, second axis of the view down."""
         flat = np.stack([number * _APART_M - points_m[..., 1], -points_m[..., 0]], axis=-1)
         return flat.astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""Plots: one model of curves, panels and figures, drawn by matplotlib without a screen.
+"""Plots: a model of curves, panels and figures, drawn by matplotlib without a display.
 
 In: numbers with names and units.
 Out: figures as PNG, PDF or SVG, and models of pictures for pages.

@@ -45,7 +45,7 @@ def plain_axis(axis: Axes) -> None:
 
 
 def save(figure: Figure, path: Path, error: type[ActiveSteerError] = ParameterError) -> Path:
-    """Write a figure in all formats, with the layout of the first file, and return its path."""
+    """Write a figure in all formats with the same layout, and return the first path."""
     with atomic_write(path, error) as part:
         try:
             figure.savefig(part, dpi=DOTS_PER_INCH)
@@ -68,7 +68,7 @@ _SCALE: Final = "viridis"
 
 
 def draw(picture: Picture) -> Figure:
-    """Draw the panels of a picture into a matplotlib figure."""
+    """Draw the panels into a matplotlib figure."""
     count = len(picture.panels)
     columns = picture.columns or (2 if count == 4 else min(count, _BESIDE))
     rows = math.ceil(count / columns)
@@ -99,7 +99,7 @@ def draw(picture: Picture) -> Figure:
 def save_all(
     pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str = ""
 ) -> list[Path]:
-    """Draw pictures and write them as PNG files."""
+    """Draw figures and write them as PNG files."""
     directory = make_folder(folder, ParameterError)
     paths = []
     for name, make in pictures.items():
@@ -177,7 +177,7 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
 
 
 def _add_abscissa(axis: Axes, label: str, first: Array, second: Array) -> None:
-    """Draw a second abscissa above a panel, with values that grow with the values of the first one."""
+    """Add a second abscissa above a panel, with values that increase with the first ones."""
 
     def to_second(x: ArrayLike) -> ArrayLike:
         return np.interp(np.asarray(x), first, second)
@@ -220,7 +220,7 @@ def _fill_heat(axis: Axes, heat: Heat) -> None:
 
 
 def _add_legends(figure: Figure, axes: Sequence[Axes], picture: Picture) -> None:
-    """Add a legend to each panel with names, or one below all panels if they have the same names."""
+    """Add a legend to each labelled panel, or one legend below all panels if they share their labels."""
     from matplotlib.patches import Patch  # noqa: PLC0415 - an extra, and slow to import
 
     look: dict[str, Any] = {"frameon": False, "fontsize": "x-small", "title_fontsize": "x-small"}

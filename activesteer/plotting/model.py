@@ -1,4 +1,4 @@
-"""The parts of a picture: curves and areas in panels, in the units of their axes."""
+"""Parts of a figure: panels with curves and areas."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Area(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A panel: a pair of axes with its curves.
+    """A panel: a pair of axes with curves.
 
     Attributes:
         x_label: Name and unit of the abscissa; empty where the panel below has the same abscissa.
@@ -101,7 +101,7 @@ class Panel(NamedTuple):
 
 
 class Heat(NamedTuple):
-    """A panel of coloured fields.
+    """A panel with a grid of coloured cells.
 
     Attributes:
         values: Depth of the colour of each field; nan for a blank field, shape (rows, columns).
@@ -127,7 +127,7 @@ class Heat(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """Panels next to and below each other.
+    """A figure: panels in rows and columns.
 
     Attributes:
         title: Title of the picture.

@@ -1,4 +1,4 @@
-"""Drivers and controllers of a user: by name, from a file, or as a class, an instance or a factory.
+"""Drivers and controllers of a user, given by name, as a file, or as a class, an instance or a factory.
 
 In: a name, a file, a class or a factory.
 Out: a specification that makes the block, with its declared parameters.

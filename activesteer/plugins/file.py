@@ -1,4 +1,4 @@
-"""A class or function in a user's file, `my_file.py:MyController?gain=2`, or a file of another format, such as an FMU.
+"""A class or function in a user's file, such as `my_file.py:MyController?gain=2`, or a file such as an FMU.
 
 The group `activesteer.formats` maps the ending of a file to a function of the file and the kind of block, which returns
 a `Plugin`. Another distribution can add a format.
@@ -84,19 +84,19 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
 
 
 def is_user_module(name: str) -> bool:
-    """Return whether a module was loaded from a user's file, or from next to it."""
+    """Return whether a module was loaded from the folder of a user's file."""
     return isinstance(getattr(getattr(sys.modules.get(name), "__spec__", None), "loader", None), _Uncached)
 
 
 class _Uncached(SourceFileLoader):
-    """Loader without a compiled file, which would hide a change made within the same second."""
+    """Loader without bytecode cache, which would hide a change within the same second."""
 
     def path_stats(self, path: str) -> NoReturn:  # type: ignore[override]
         raise OSError("no compiled file")
 
 
 class _Neighbours:
-    """Finder of the modules next to users' files, with the names of the imported modules by folder."""
+    """Finder of modules next to users' files. It stores the names of the imported modules by folder."""
 
     folders: ClassVar[dict[str, frozenset[str]]] = {}
 
@@ -113,7 +113,7 @@ class _Neighbours:
     @classmethod
     @contextmanager
     def first(cls, folder: Path, files: Iterable[str]) -> Iterator[None]:
-        """Load modules anew: in this context first from a folder, and afterwards only if no other is found."""
+        """Context in which modules of a folder take precedence and are loaded anew."""
         names = frozenset(Path(file).parts[0].removesuffix(".py") for file in files)
         loaded = [name for name in sys.modules if name.partition(".")[0] in names]
         others = {name: sys.modules[name] for name in loaded if not is_user_module(name)}
@@ -132,7 +132,7 @@ class _Neighbours:
 
 
 def source_of(text: str) -> dict[str, bytes]:
-    """Read the file that a text names, and the modules next to it that it imports, without running them."""
+    """Return the file of a specification and the neighbouring modules that it imports, without execution."""
     form = _FORM.fullmatch(text)
     return {} if form is None else _with_neighbours(user_path(form["path"], ParameterError), ParameterError)
 
@@ -154,7 +154,7 @@ def _with_neighbours(path: Path, error: type[ActiveSteerError]) -> dict[str, byt
 
 
 def _imported_from(folder: Path, source: bytes) -> list[Path]:
-    """Modules, and files of packages, in a folder that a source imports, or none if the source is not Python."""
+    """Find the modules and package files in a folder that a source imports, none if it is not Python."""
     try:
         nodes = list(ast.walk(ast.parse(source)))
     except (SyntaxError, ValueError, RecursionError):
@@ -174,7 +174,7 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
 
 
 def parse_parameters(text: str, fail: Any) -> dict[str, Any]:
-    """Parse `gain=2&side="left"`, split only where a name follows, so that a value can contain `&`."""
+    """Parse `gain=2&side="left"`. An `&` splits only before a name, so a value may contain it."""
     parameters: dict[str, Any] = {}
     for part in re.split(r"&(?=[A-Za-z_]\w*=)", text) if text else ():
         pair = _PARAMETER.fullmatch(part)
@@ -192,7 +192,7 @@ def _formats() -> dict[str, EntryPoint]:
 
 
 def format_of(given: Any) -> EntryPoint | None:
-    """Return the format of a block that is given as a file, with `?name=value` for parameters, or None for others."""
+    """Return the format of a block given as a file, None for others."""
     if not isinstance(given, (str, os.PathLike)):
         return None
     name, dot, ending = os.fspath(given).partition("?")[0].lower().rpartition(".")

@@ -1,4 +1,4 @@
-"""A kind of block (controller or driver): its names, its command, and the check of the command."""
+"""Kind of a block (controller or driver): its names, its command, and the check of the command."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _OURS: Final = "activesteer."
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of block that users can replace by their own."""
+    """A kind of block that users can replace with their own."""
 
     word: str  # name of the kind, such as `controller`
     table: str  # table of the keys of its parameters, such as `controllers`
@@ -51,7 +51,7 @@ class Kind:
     _unlimited: Callable[[Any], tuple[Any, ...]] = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Look up the places of the fields, which are checked in every step."""
+        """Look up the indices of the fields, because every step checks them."""
         fields = self.result._fields
         object.__setattr__(self, "_places", tuple((fields.index(key), *limits) for key, limits in self.ranges.items()))
         unlimited = (i for i, key in enumerate(fields) if key not in self.unchecked and key not in self.ranges)
@@ -62,11 +62,11 @@ class Kind:
         return [*self.built_in, *self.data()]
 
     def is_data(self, given: Any) -> bool:
-        """Return whether a block is given as data: by the name of a data file, or by its path."""
+        """Return whether a block is given as data: by name or path of a data file."""
         return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:
-        """Return the error for a block."""
+        """Return an error about the block."""
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
     def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:
@@ -120,7 +120,7 @@ class Kind:
         return self.result(*command)
 
     def rows(self, message: Any, n: int) -> Array:
-        """Check a command for many cars, whose fields are numbers or arrays, and return its numbers by car."""
+        """Check a command for many cars, with numbers or arrays as fields, and return its numbers by car."""
         if not isinstance(message, self.result):
             problem = f"is {shown(message)}; an activesteer.{self.result.__name__} of arrays is needed"
             raise self.fail("", problem, message)
@@ -135,7 +135,7 @@ class Kind:
         return rows
 
     def _fill(self, rows: Array, name: str, value: Any) -> None:
-        """Check a field of a command for many cars, and write its numbers."""
+        """Check a field of a command for many cars, and store its numbers."""
         n, width = rows.shape
         if value is self.result._field_defaults.get(name) and not value:
             return
@@ -156,7 +156,7 @@ class Kind:
 
 
 def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
-    """Describe an error of foreign code in one line, with its place.
+    """Describe an error of foreign code in one line, with file and line.
 
     The place is the last line in one of the user's files, else the last line that is not in a library.
     """
@@ -172,7 +172,7 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
 
 
 def _words(error: BaseException) -> str:
-    """Return class and text of an error from foreign code, even if making the text fails too."""
+    """Return class and message of an error of foreign code, even if creating the message fails."""
     name = type(error).__name__
     try:
         return f"{name}: {error}".removesuffix(": ")
@@ -183,7 +183,7 @@ def _words(error: BaseException) -> str:
 
 
 def _nearest_attributes(given: Any, name: str) -> str:
-    """Return words for the attributes closest to a wrong name, including attributes of inner dataclasses."""
+    """Return a hint with the attributes closest to a wrong name, including attributes of inner dataclasses."""
     known = _attributes(given)
     last = {path.rpartition(".")[2]: path for path in sorted(known, key=lambda path: -path.count("."))}
     close = difflib.get_close_matches(name, last, n=3, cutoff=0.6)
@@ -191,7 +191,7 @@ def _nearest_attributes(given: Any, name: str) -> str:
 
 
 def _attributes(given: Any) -> list[str]:
-    """Return the public values of an object, and with a dot the values of its dataclasses."""
+    """Return the public values of an object and, by dotted name, of its dataclasses."""
     names = [*getattr(given, "_fields", ()), *vars(type(given)), *getattr(given, "__dict__", ())]
     found = [name for name in dict.fromkeys(names) if name[0] != "_" and not callable(getattr(given, name, None))]
     for name in tuple(found):

@@ -1,4 +1,4 @@
-"""A user's code as a plug-in, and kinds of plug-ins."""
+"""A user's driver or controller as a plug-in, and the kinds of plug-ins."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def declared_in(table: Any, keys: Collection[str], prefix: str) -> dict[str, Dec
 
 
 def takes_any(origin: Any) -> bool:
-    """Return whether a class or function takes any keywords and declares none of them."""
+    """Return whether a class or function accepts any keyword without declaring one."""
     arguments = _arguments(getattr(origin, "from_vehicle", origin)).values()
     return any(argument.kind is argument.VAR_KEYWORD for argument in arguments) and not hasattr(origin, "PARAMETERS")
 
@@ -87,7 +87,7 @@ def takes_any(origin: Any) -> bool:
 def read_values(
     declared: Mapping[str, Declared], values: Mapping[str, Any], source: Source, path: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Check values of declared parameters, in any of their units, and return them by the names of the arguments."""
+    """Check values of declared parameters, and return them by argument name in the unit of the argument."""
     found: dict[str, Any] = {}
     for key, value in values.items():
         name, factor = field_in_unit(key, declared)
@@ -125,7 +125,7 @@ def _parts(annotation: Any) -> tuple[Any, ...]:
 
 
 def _hint(hint: Any, default: Any) -> Any:
-    """Return the type of an annotation if it can be checked. Otherwise return the type of the default, or `Any`."""
+    """Return the type of an annotation if it can be checked, otherwise the type of the default, or `Any`."""
     if hint is _EMPTY:
         kind = type(default)
         return float | int if kind in (float, int) else kind if kind in (bool, str) else Any
@@ -159,18 +159,18 @@ class Plugin:
     is_builtin: bool = False
 
     def __post_init__(self) -> None:
-        """Mark in its label that a block uses the truth, and only once for a copy of a block."""
+        """Mark in the label, only once, that a block uses the true motion."""
         if self.uses_truth and not self.label.endswith("+truth"):
             object.__setattr__(self, "label", f"{self.label}+truth")
 
     @property
     def uses_truth(self) -> bool:
-        """Flag of a block that requests the truth: its attribute of this name."""
+        """Flag of a block that requests the true motion: its attribute of this name."""
         return bool(getattr(self.origin, "uses_truth", False))
 
     @property
     def key(self) -> str:
-        """Name of the class or function, which its parameters have in keys."""
+        """Name of the class or function, part of the keys of its parameters."""
         about = getattr(self.origin, "func", self.origin)
         return getattr(about, "__name__", type(about).__name__)
 
@@ -191,11 +191,11 @@ class Plugin:
             raise self.kind.fail(self.name, str(reason)) from reason
 
     def own_parameter(self, path: Sequence[str]) -> str:
-        """Return the parameter of a user's block that a key below the table of its kind names, or an empty text."""
+        """Return the parameter that a key names, empty if the block has none."""
         return "" if self.is_builtin or path[0] != self.key else ".".join(path[1:])
 
     def own_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Check overrides of the parameters and return them by the names of the arguments.
+        """Check overrides of the parameters and return them by argument name.
 
         Args:
             values: Name -> value.
@@ -227,7 +227,7 @@ class Plugin:
         return value / factor if factor != 1.0 else value
 
     def parameters_with(self, own: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        """Return the values of all parameters that a recording can hold, with a user's defaults.
+        """Return the values of all parameters that a recording can store, including defaults.
 
         Args:
             own: Overrides: class -> name -> value.
@@ -238,7 +238,7 @@ class Plugin:
         return _plain({**defaults, **self.parameters, **own.get(self.key, {})})
 
     def make(self, setup: Any) -> Any:
-        """Create the block in its original state, without memory of earlier runs.
+        """Create the block without memory of earlier runs.
 
         Args:
             setup: Properties of the car that the block may know.
@@ -267,7 +267,7 @@ class Plugin:
         return Watched(block, kind, self.name, setup, tuple(self.files))
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        """Pickle a block of a user's file as its text, so that unpickling loads the file."""
+        """Pickle a block of a user's file as its specification, so that unpickling loads the file."""
         if is_user_module(getattr(self.origin, "__module__", "")):
             return find, (self.name, self.kind)
         return super().__reduce_ex__(protocol)
@@ -283,7 +283,7 @@ class Plugin:
 
 
 class Watched:
-    """A user's block whose errors and wrong commands are reported with file, class and line."""
+    """Wrapper of a user's block that reports errors and wrong commands with file, class and line."""
 
     def __init__(self, inner: Any, kind: Kind, name: str, setup: Any, files: tuple[str, ...] = ()) -> None:
         self.inner = inner
@@ -314,7 +314,7 @@ class Watched:
 
 
 def find(given: Any, kind: Kind) -> Plugin:
-    """Find a controller or driver, and check it as far as possible before it is created.
+    """Find a controller or driver, and check it as far as possible before its creation.
 
     Args:
         given: A built-in name; `my_file.py:MyController`, with `?gain=2&limit_rad=0.05` for parameters; a class; an
@@ -350,7 +350,7 @@ def find(given: Any, kind: Kind) -> Plugin:
 
 
 def allowed(plugin: Plugin) -> Plugin:
-    """Return a plugin, but reject a class with the name of a built-in block, or of a table of its keys."""
+    """Return a plug-in, or reject a class with the name of a built-in block or of a table of its keys."""
     if plugin.key in (reserved := (*plugin.kind.names(), *plugin.kind.reserved)):
         problem = f"a {plugin.kind.word} of your own cannot have the name {plugin.key!r}; rename it"
         raise plugin.kind.fail(plugin.name, problem, plugin.key, reserved)
@@ -358,7 +358,7 @@ def allowed(plugin: Plugin) -> Plugin:
 
 
 def is_instance(given: Any) -> bool:
-    """Return whether an object is a block, not a class or function that creates one."""
+    """Return whether an object is a block itself, not a class or factory."""
     return not isinstance(given, type) and callable(getattr(given, "step", None))
 
 
@@ -383,5 +383,5 @@ def _from_object(given: Any, kind: Kind) -> Plugin:
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Select the values that can be recorded."""
+    """Select the values that a recording can store."""
     return {key: value for key, value in values.items() if isinstance(value, _PLAIN) and not key.startswith("_")}

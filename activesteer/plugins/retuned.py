@@ -1,4 +1,4 @@
-"""Blocks with new parameters that keep their memory.
+"""Change of parameters of a block that keeps its memory.
 
 A block is compared with one that was just made with the old parameters. A value that is still the same follows from the
 parameters, and the value of a block made with the new ones replaces it. A value that has changed since is memory
@@ -46,7 +46,7 @@ def _kept(running: Any, before: Any, after: Any, seen: set[int]) -> Any:
 
 
 def _fill(running: Any, before: Any, after: Any, seen: set[int]) -> None:
-    """Give an object the memory of a running one."""
+    """Transfer the memory of a running object to another one."""
     old, made, new_state = (_state(block) for block in (running, before, after))
     derived = getattr(type(running), "derived", ())
     new = {name: value for name, value in _kept_parts(old, made, new_state, seen).items() if name not in derived}
@@ -67,14 +67,14 @@ def _kept_parts(
 
 
 def _state(block: Any) -> dict[str, Any]:
-    """Return the attributes of a block, or its own state if it has `__setstate__`."""
+    """Return the attributes of a block, or its state if it has `__setstate__`."""
     if hasattr(block, "__setstate__"):
         return block.__getstate__()
     return {name: getattr(block, name) for name in _attributes(block)}
 
 
 def same(one: Any, other: Any, seen: frozenset[tuple[int, int]] = frozenset()) -> bool:
-    """Return whether two values are equal in all their parts."""
+    """Return whether two values are equal, compared recursively."""
     pair = id(one), id(other)
     if one is other or pair in seen:
         return True
@@ -93,7 +93,7 @@ def same(one: Any, other: Any, seen: frozenset[tuple[int, int]] = frozenset()) -
 
 
 def _parts(value: Any) -> Mapping[Any, Any] | None:
-    """Return the parts of a container or an object, or None for a value without parts."""
+    """Return the members of a container or an object, None for a simple value."""
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple | deque):

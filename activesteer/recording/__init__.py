@@ -1,4 +1,4 @@
-"""Recordings: channel table, MCAP writer and reader, and `Recording`, the arrays of a run by channel name.
+"""Recordings: channel table, MCAP writer and reader, and the class `Recording`.
 
 In: rows of channels, poses and metadata.
 Out: MCAP files, and `Recording` with arrays by channel name.

@@ -1,4 +1,4 @@
-"""MCAP chunks: rows of channel values and poses to bytes, and back."""
+"""MCAP chunks: encoding of rows and poses, and decoding."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _index_record(channel_id: int, time_ns: NDArray[np.uint64], offsets: NDArray
 
 
 def few_messages(channel_id: int, messages: Sequence[tuple[int, bytes]]) -> ChunkData:
-    """Return a chunk of messages of one topic: time [ns], ascending, and data of each."""
+    """Return a chunk of messages of one topic."""
     records = []
     for time_ns, data in messages:
         record = message_record(channel_id, FixedMessage().constant(data))
@@ -54,7 +54,7 @@ def few_messages(channel_id: int, messages: Sequence[tuple[int, bytes]]) -> Chun
 
 
 class _Rows:
-    """Block of rows with constant bytes, whose numbers change from block to block."""
+    """Template of a block of rows: constant bytes, and numbers that change from block to block."""
 
     def __init__(self, layout: FixedMessage) -> None:
         self.layout = layout
@@ -100,7 +100,7 @@ class BlockEncoder:
         return len(self._rows.layout)
 
     def _column_stretches(self, layout: FixedMessage) -> list[list[tuple[slice, slice]]]:
-        """Return, for each run of channel values, its parts that come from adjacent columns.
+        """Split each run of channel values into pieces from adjacent columns.
 
         numpy would copy the values first if it were given a list of columns.
         """
@@ -130,7 +130,7 @@ class BlockEncoder:
         positions_m: NDArray[np.float64],
         quaternions: NDArray[np.float64],
     ) -> ChunkData:
-        """Encode a block from the arguments of `McapWriter.write`, with times in nanoseconds."""
+        """Encode a block."""
         rows, poses = len(row_ns), len(pose_ns)
         self._encode_rows(row_ns, values)
         self._encode_poses(pose_ns, positions_m, quaternions)
@@ -203,7 +203,7 @@ _OTHERS: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 
 class Group(NamedTuple):
-    """Channels that share a topic, and the layout of their messages."""
+    """Channels of one topic, and the layout of their messages."""
 
     topic: str  # name of the topic
     names: list[str]  # names of its fields

@@ -92,7 +92,7 @@ class McapFile:
         return number
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record to the file."""
+        """Write a metadata record."""
         offset = self._position
         length = self._put_record(Metadata(name=name, metadata=dict(values)))
         self._metadata.append(MetadataIndex(offset=offset, length=length, name=name))

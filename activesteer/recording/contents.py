@@ -1,4 +1,4 @@
-"""Contents of a recording apart from its rows, and their checks: metadata, metrics, names, events, scene.
+"""Contents of a recording except its rows, with their checks: metadata, metrics, names, events, scene.
 
 In a file an event is a message of Foxglove's log, so other tools show it on their time axis. In the metadata the events
 are a list of tables with the fields of `Event`.
@@ -204,7 +204,7 @@ class _Sizes:
 
 
 def _letters(value: str, key: str, maximum: int) -> None:
-    """Check that a text is short enough and can be encoded in UTF-8."""
+    """Check that a string is short enough and can be encoded in UTF-8."""
     _count(len(value), maximum, "letters", key=key[:_SHOWN])
     try:
         value.encode()
@@ -264,7 +264,7 @@ LIBRARY = "activesteer "
 
 
 def is_recording_start(data: bytes) -> bool:
-    """Return whether a file with this start is a recording of ours, even if it is damaged or empty."""
+    """Return whether a file with this start is a recording of activesteer, even if damaged or empty."""
     # Magic, opcode, length of the record, then two texts with their lengths: profile and library.
     start = len(MCAP0_MAGIC) + 9
     head = MCAP0_MAGIC + bytes([Opcode.HEADER])
@@ -273,7 +273,7 @@ def is_recording_start(data: bytes) -> bool:
 
 
 def metadata_texts(metadata: Mapping[str, object]) -> tuple[dict[str, str], dict[str, str]]:
-    """Convert metadata to the texts of an MCAP file."""
+    """Convert metadata to the strings of an MCAP file."""
     texts: dict[str, str] = {}
     metrics = metadata.get("metrics", {})
     if not isinstance(metrics, Mapping):
@@ -334,7 +334,7 @@ class Primitive(NamedTuple):
 
 
 class Link(NamedTuple):
-    """Straight part through points of bodies, such as a suspension link.
+    """Straight line through points of bodies, such as a suspension link.
 
     The poses of the bodies move it.
 
@@ -433,7 +433,7 @@ def _link_of(table: dict[str, Any]) -> Link:
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
-    """Read a scene: the solids of each body in the order box, cylinder, sphere, then the links."""
+    """Parse a scene."""
     update = message_class(SCENE_SCHEMA).FromString(data)
     limits.check_count(len(update.entities), limits.MAX_PARTS, "entities", RecordingError, key="scene")
     primitives: list[ScenePart] = []

@@ -1,4 +1,4 @@
-"""Reader of MCAP files, whole, cut or damaged, with limits for all sizes that a file declares."""
+"""Reader of complete, truncated or damaged MCAP files, with limits for all declared sizes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Records:
     _count: int = 0
 
     def read_next(self, descriptor: int, size: int) -> None:
-        """Read one record, and move the position to its end even if the record is broken."""
+        """Read one record, and move to its end even if it is damaged."""
         start, self.position = self.position, size + 1
         head = read_bytes(descriptor, start, min(_RECORD.size, size - start))
         opcode, length = _RECORD.unpack(head)
@@ -128,7 +128,7 @@ class Records:
 
 
 def opened(path: Path) -> int:
-    """Open a regular file and return its descriptor. A device or pipe, which may never end, is rejected."""
+    """Open a regular file and return its descriptor. Devices and pipes, which may never end, are rejected."""
     with reading(path, RecordingError):
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -159,7 +159,7 @@ def read_records(descriptor: int, size: int) -> Records:
 
 
 def words_of(error: BaseException) -> str:
-    """Describe an error of ours or of a library in words."""
+    """Describe an error of this package or of a library."""
     if isinstance(error, RecordingError):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
@@ -251,7 +251,7 @@ def _decode(descriptor: int, records: Records) -> dict[str, Any]:
 
 
 class _Rows:
-    """Collector of chunks: their places, all times, and the blocks themselves if they are few."""
+    """Collector of chunks: positions, times, and the decoded blocks of a small file."""
 
     def __init__(self, channels: int, chunks: int) -> None:
         self._width = max(channels, 1)
@@ -263,7 +263,7 @@ class _Rows:
         self._last_ns = [-1, -1]
 
     def add(self, place: Place, data: bytes, decoder: BlockDecoder) -> Block:
-        """Check a chunk, and keep its contents at `place`."""
+        """Check a chunk, and store its contents under its position."""
         block = decoder.decode(data)
         for kind, time_ns in enumerate((block.row_ns, block.pose_ns)):
             if not len(time_ns):
@@ -291,7 +291,7 @@ class _Rows:
     def collected(
         self, descriptor: int, decoder: BlockDecoder, channels: list[SignalChannel]
     ) -> tuple[NDArray[np.float64] | FileRows, Poses | None]:
-        """Return all values and poses, or an object that reads them later."""
+        """Return all values and poses, read at once or on demand."""
         if self._blocks is None:
             return FileRows(descriptor, decoder, channels, self._places), None
         sets = sum(place.poses for place in self._places)

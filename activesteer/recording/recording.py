@@ -1,4 +1,4 @@
-"""Recording in memory with its exports, and names for several recordings.
+"""Recording with its exports, and names for several recordings.
 
 CSV and Parquet are written with pyarrow and need no pandas.
 """
@@ -184,7 +184,7 @@ class Recording:
         return frame
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write a line of names and a line per row: `time_s`, then the channels.
+        """Write a CSV file: a header, then a line per row, with `time_s` first.
 
         An existing file is replaced.
 
@@ -204,7 +204,7 @@ class Recording:
         return _written(path, write)
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
-        """Write `time_s` and the channels as columns.
+        """Write a Parquet file with `time_s` and the channels as columns.
 
         An existing file is replaced.
 
@@ -219,7 +219,7 @@ class Recording:
         return _written(path, lambda target: parquet.write_table(_table(self), target, compression="zstd"))
 
     def to_mat(self, path: str | os.PathLike[str]) -> Path:
-        """Write a MATLAB file of version 5, which every MATLAB and Octave can load.
+        """Write a MATLAB file of version 5, which MATLAB and Octave can load.
 
         An existing file is replaced.
 
@@ -279,7 +279,7 @@ class Recording:
         return _frozen(self._values.values()) if isinstance(self._values, FileRows) else self._values
 
     def at(self, rows: NDArray[np.intp]) -> Recording:
-        """Return the run in memory with some of its rows (ascending numbers) and all poses."""
+        """Return the run in memory with some of its rows and all poses."""
         values = self._values.at(rows) if isinstance(self._values, FileRows) else self._values[rows]
         return Recording(
             self._channels, self._time_s[rows], values, poses=self.poses, metadata=self.metadata,
@@ -351,7 +351,7 @@ def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> P
 
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
-    """Return a name for each run: its controller if all differ, else its file, with the folder if needed."""
+    """Return a name for each run: its controller, or its file if controllers repeat."""
     # A user's controller is named by file and class; the class is enough.
     controllers = [
         str(run.metadata.get("controller", "run")).rpartition(":")[2]

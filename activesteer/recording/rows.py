@@ -1,4 +1,4 @@
-"""Rows of a recording that stay in their file until they are needed, by channel or by block."""
+"""Rows of a recording, read from the file on demand by channel or by block."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Poses(NamedTuple):
     quaternions: NDArray[np.float64]
 
     def usable(self) -> NDArray[np.bool_]:
-        """Return the mask of the sets of poses that can be drawn, shape (k,): plausible positions and orientations."""
+        """Return the mask of the poses that can be drawn, with plausible positions and orientations."""
         near = (np.abs(self.positions_m) <= LIMIT_M).all(axis=(1, 2))
         size = np.linalg.norm(self.quaternions, axis=2)
         return near & ((size > _SMALLEST) & (size < 1.0 / _SMALLEST)).all(axis=1)
@@ -68,7 +68,7 @@ _SMALLEST: Final = 1e-6
 
 
 class Place(NamedTuple):
-    """Place and contents of a chunk."""
+    """Position and contents of a chunk."""
 
     start: int  # first byte of the content of its record
     length: int  # length of the content [bytes]
@@ -121,7 +121,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
 
 
 def values_of(blocks: Iterable[Block], rows: int, channels: int) -> NDArray[np.float64]:
-    """Return all values of blocks, shape (rows, channels), columns contiguous."""
+    """Return all values of blocks, shape (rows, channels), with contiguous columns."""
     values = np.empty((rows, channels), order="F")
     done = 0
     for block in blocks:
@@ -147,12 +147,12 @@ def poses_of(blocks: Iterable[Block], sets: int, body_names: tuple[str, ...]) ->
 
 
 class FileRows:
-    """Rows of an open file, even after it is replaced or deleted, but not after it is changed."""
+    """Rows of an open file. They stay valid if the file is replaced or deleted, but not if it is changed."""
 
     def __init__(
         self, descriptor: int, decoder: BlockDecoder, channels: Sequence[Channel], places: list[Place]
     ) -> None:
-        """Take over an open file."""
+        """Take ownership of an open file."""
         self._descriptor = descriptor
         self._decoder = decoder
         self._types = [np.dtype("<f4" if channel.single else "<f8") for channel in channels]
@@ -190,7 +190,7 @@ class FileRows:
         return self._load(columns)[columns.index(column)].astype(np.float64)
 
     def at(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return the values of all channels in ascending rows, shape (len(rows), number of channels)."""
+        """Return the values of all channels in ascending rows, shape (number of rows, channels)."""
         values = np.empty((len(rows), len(self._types)), order="F")
         done = before = 0
         for block in self.blocks():
@@ -209,7 +209,7 @@ class FileRows:
         return poses_of(self.blocks(), sum(place.poses for place in self._places), self._decoder.body_names)
 
     def _neighbours(self, column: int) -> list[int]:
-        """Return the columns that are read together with a column."""
+        """Return the columns that share their messages with a column."""
         width = max(1, _READ_BYTES // (4 * max(self._rows, 1)))  # most channels have 32 bit
         first = column - column % width
         return list(range(first, min(first + width, len(self._types))))

@@ -43,7 +43,7 @@ _CONTINUES = np.array([0x80, 0x80, 0x80, 0x80, 0], np.uint64)
 
 @dataclass(frozen=True)
 class ColumnRun:
-    """Numbers at a constant distance in a message."""
+    """Run of numbers at a constant distance in a message."""
 
     dtype: str  # little-endian numpy type of one number
     offset: int  # position of the first number in the message [byte]
@@ -67,7 +67,7 @@ def tag(field: int, wire_type: int) -> bytes:
 
 
 def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Encode times as google.protobuf.Timestamp, each number as a varint padded to five bytes."""
+    """Encode times as google.protobuf.Timestamp with varints padded to five bytes."""
     out = np.empty((len(time_ns), STAMP_LENGTH), np.uint8)
     billion = np.uint64(1_000_000_000)
     for field, start, value in ((1, 0, time_ns // billion), (2, 6, time_ns % billion)):
@@ -77,7 +77,7 @@ def timestamps(time_ns: NDArray[np.uint64]) -> NDArray[np.uint8]:
 
 
 class FixedMessage:
-    """Message of constant length: a template with all numbers zero, and the places of the numbers."""
+    """Layout of a message of constant length: its bytes, and the positions of its numbers."""
 
     def __init__(self) -> None:
         """Start with an empty message."""
@@ -89,7 +89,7 @@ class FixedMessage:
         return len(self.template)
 
     def constant(self, data: bytes) -> FixedMessage:
-        """Append bytes that are the same in every message."""
+        """Append constant bytes."""
         self.template += data
         return self
 
@@ -118,7 +118,7 @@ class FixedMessage:
         return self
 
     def text(self, field: int, value: str) -> FixedMessage:
-        """Append a `string` field that is the same in every message."""
+        """Append a constant `string` field."""
         data = value.encode()
         return self.constant(tag(field, BYTES) + varint(len(data)) + data)
 
@@ -134,13 +134,13 @@ class FixedMessage:
         return self
 
     def allocate(self, rows: int) -> NDArray[np.uint8]:
-        """Return a writeable block of messages with zeros, shape (rows, length)."""
+        """Return a writeable block of empty messages, shape (rows, length)."""
         block = np.empty((rows, len(self.template)), np.uint8)
         block[:] = np.frombuffer(self.template, np.uint8)
         return block
 
     def views(self, block: NDArray[np.uint8]) -> list[NDArray]:
-        """Return the numbers of a contiguous block as views, one of shape (rows, count) per run."""
+        """Return views of the numbers of a contiguous block, one of shape (rows, count) for each run."""
         length = len(self.template)
         if not len(block):  # numpy takes no offset into an empty buffer
             return [np.empty((0, run.count), run.dtype) for run in self.runs]
@@ -162,7 +162,7 @@ class FixedMessage:
 
     @cached_property
     def _constants(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-        """Return the message with zeros, and a mask that is zero at the numbers."""
+        """Return an empty message, and the mask of its constant bytes."""
         mask = np.full(len(self.template), 255, np.uint8)
         for run in self.runs:
             width = np.dtype(run.dtype).itemsize
@@ -231,7 +231,7 @@ _FOXGLOVE_ENUMS = {
 
 
 def _define(package: str, name: str, fields: str, enum: Sequence[str] = ()) -> DescriptorProto:
-    """Return the descriptor of a message with `fields` in the notation of .proto and `enum` as nested `Type`."""
+    """Return the descriptor of a message from fields in the notation of .proto."""
     message = DescriptorProto(name=name)
     for repeated, kind, field_name, number in _FIELD.findall(fields):
         # An explicit JSON name separates names that differ in case only (`a_n`, `a_N`).
@@ -285,7 +285,7 @@ def state_schema(group: str, channels: Iterable[Channel]) -> tuple[str, bytes]:
 
 
 def state_fields(schema: bytes, schema_name: str) -> tuple[list[str], FixedMessage]:
-    """Return the field names of a schema of `state_schema` in their order, and the layout of the messages."""
+    """Parse a schema of `state_schema`, and return its field names and the layout of its messages."""
     files = FileDescriptorSet.FromString(schema).file
     messages = [each for file in files for each in file.message_type if f"{file.package}.{each.name}" == schema_name]
     if not messages:
@@ -308,7 +308,7 @@ def state_layout(channels: Iterable[Channel]) -> FixedMessage:
 
 
 def transforms_layout(body_names: Iterable[str]) -> FixedMessage:
-    """Return the layout of `foxglove.FrameTransforms`: every body is a child of `world`.
+    """Return the layout of `foxglove.FrameTransforms`, where every body is a child of `world`.
 
     For each body in order, its runs are the timestamp (bytes), the position x y z, and the quaternion x y z w.
     """
@@ -389,7 +389,7 @@ class ChannelTable:
             ) from None
 
     def groups(self) -> dict[str, list[int]]:
-        """Return the columns of each group, ordered by the first channel of the group."""
+        """Return the columns of each group, in the order of the groups' first channels."""
         columns: dict[str, list[int]] = {}
         for column, channel in enumerate(self._channels):
             columns.setdefault(channel.group, []).append(column)
@@ -447,7 +447,7 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
 
 
 def shaped(array: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a float array of a given shape."""
+    """Return values as a float array of a given shape."""
     try:
         numbers = np.asarray(array, np.float64)
     except (TypeError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Writer of a recording: a locked target, and blocks that are streamed into an MCAP file during the run."""
+"""Writer of a recording: it locks the target and streams blocks into an MCAP file."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _START_BYTES: Final = 64
 
 
 def check_target(path: str | Path, *, overwrite: bool = True) -> None:
-    """Check that a recording can be written to a path, without changes and only in place of a recording."""
+    """Check that a recording may be written to a path, without changing anything."""
     path = Path(path)
     if not path.parent.is_dir():
         raise RecordingError(f"cannot write {path}: folder {path.parent} does not exist", value=path.parent)
@@ -80,7 +80,7 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
 
 
 def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
-    """Create a locked file in place of an existing one.
+    """Create a locked file that replaces an existing one.
 
     A process that has opened the old file keeps it, because it is deleted and not changed.
     """
@@ -119,7 +119,7 @@ _BLOCKS_IN_FLIGHT = 1  # More blocks would be lost by a kill, and would fill mem
 
 
 class McapWriter:
-    """Stream of channel values and poses into an MCAP file, which is always readable up to the last block.
+    """Stream of channel values and poses into an MCAP file that can be read at any time.
 
     `write` encodes in the calling thread. A thread of its own compresses and writes, because zstd and file output
     release the interpreter lock. The next `write` or `close` raises an error of that thread.
@@ -139,7 +139,7 @@ class McapWriter:
         *,
         overwrite: bool = True,
     ) -> None:
-        """Open the file and write the data known before the run.
+        """Open the file and write the data that are known before the run.
 
         Args:
             path: File to write.
@@ -298,7 +298,7 @@ class McapWriter:
         return self.path
 
     def close(self, metadata: Mapping[str, object] | None = None) -> None:
-        """Write the data known after the run, and end the file.
+        """Write the data that are known after the run, and end the file.
 
         A second call does nothing.
 
@@ -375,7 +375,7 @@ class McapWriter:
         return RecordingError(f"cannot write {self.path}: {error.strerror or error}{saved}", value=self.path)
 
     def _abandon(self) -> None:
-        """Release thread and file without ending the file properly."""
+        """Release thread and file without completing the file."""
         self._closed = True
         self._thread.shutdown(wait=True, cancel_futures=True)
         with suppress(OSError):  # the caller handles the first error

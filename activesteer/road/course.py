@@ -19,7 +19,7 @@ from activesteer.road.obstacles import Grid
 
 
 class Lane(NamedTuple):
-    """A section between two rows of cones, along the world's x [m]."""
+    """A lane between two rows of cones, along the world's x [m]."""
 
     name: str
     start_x_m: float
@@ -28,7 +28,7 @@ class Lane(NamedTuple):
     left_y_m: float
 
     def outline_m(self) -> NDArray[np.float64]:
-        """Return the corners of the section as a closed line: world x and y [m], shape (5, 2)."""
+        """Return the corners of the lane as a closed line in world axes [m], shape (5, 2)."""
         (start, end), (right, left) = self[1:3], self[3:]
         return np.array([(start, right), (end, right), (end, left), (start, left), (start, right)])
 
@@ -56,21 +56,21 @@ class Course:
 
     @property
     def first_gate_x_m(self) -> float:
-        """Start of the first lane, or the first cone if there are no lanes [m], or 0 without both."""
+        """Start of the first lane or, without lanes, of the first cone [m]."""
         if self.lanes:
             return min(lane.start_x_m for lane in self.lanes)
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def on_lane_side(self) -> NDArray[np.bool_]:
-        """Return the mask of the cones at the sides of a lane, shape (number of cones,)."""
+        """Return the mask of the cones that mark a lane."""
         return self._outward() != 0.0
 
     def cone_centres_m(self) -> Array:
-        """Return world x and y [m] of the cones' bases outside the lane that they mark, shape (n, 2)."""
+        """Return the centres of the cones [m], outside the lanes that they mark, shape (n, 2)."""
         return np.column_stack([self.cones_m[:, 0], self.cones_m[:, 1] + CONE_RADIUS_M * self._outward()])
 
     def _outward(self) -> Array:
-        """Return 1 for each cone on the left of a lane, -1 on the right, 0 elsewhere, shape (number of cones,)."""
+        """Return the side of each cone: 1 on the left of a lane, -1 on the right, 0 elsewhere."""
         x, y = self.cones_m.T
         outward = np.zeros(len(x))
         for lane in self.lanes:
@@ -80,7 +80,7 @@ class Course:
         return outward
 
     def to_table(self) -> dict[str, Any]:
-        """Return the course as plain tables, which a recording keeps as `course` in JSON."""
+        """Return the course as plain tables, as a recording stores it."""
         return {
             "path": {"x_m": self.path.x_m.tolist(), "y_m": self.path.y_m.tolist()},
             "lanes": [lane._asdict() for lane in self.lanes],
@@ -91,7 +91,7 @@ class Course:
 
     @classmethod
     def from_table(cls, table: object) -> Course:
-        """Build the course that `to_table` describes, with heading and curvature by differences between its points."""
+        """Create the course that `to_table` describes."""
         course = table_of(table, "course")
         path = table_of(course.get("path"), "course.path")
         x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
@@ -136,7 +136,7 @@ _RANGE_M: Final = (0.01, 100.0)
 
 
 class Footprint(NamedTuple):
-    """Dimensions of a car, by default usual ones for drawing, with the widths of front and rear tyres."""
+    """Dimensions of a car, with usual values for drawing as defaults."""
 
     width_m: float = 1.8
     wheelbase_m: float = 2.7
@@ -162,7 +162,7 @@ class Footprint(NamedTuple):
 
 
 def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
-    """Return the dimensions of the car of a recorded run, or None if they were not recorded."""
+    """Return the dimensions of the car of a recorded run, None if not recorded."""
     table = metadata.get("car")
     return None if table is None else Footprint.from_table(table)
 
@@ -175,7 +175,7 @@ _HIGHEST_M: Final = 1000.0
 
 @dataclass(frozen=True)
 class ProfileTable:
-    """Heights of the road over the distance.
+    """Height profile of a road.
 
     Keys of the table [road.heights], which a CSV of `road.profile` fills.
 
@@ -210,7 +210,7 @@ class ProfileTable:
 
 
 def sampled(s_m: tuple[float, ...], values: tuple[float, ...], step_m: float) -> tuple[float, Array]:
-    """Return the step [m], at most `step_m`, and values at even places of a smooth curve (monotone cubics)."""
+    """Resample a smooth curve at even positions (monotone cubics), and return the step [m]."""
     from scipy.interpolate import PchipInterpolator  # noqa: PLC0415 - slow to import, and needed for few roads
 
     count = max(2, math.ceil((s_m[-1] - s_m[0]) / step_m) + 1)

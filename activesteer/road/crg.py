@@ -46,14 +46,14 @@ _ZERO, _KEEP_LAST = 1, 2
 
 
 class CrgRoad(NamedTuple):
-    """Heights along the reference line, and this line, from the origin along x, if it is curved."""
+    """Heights along the reference line, and the line itself if it is curved."""
 
     grid: Grid
     line: Path | None
 
 
 def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return files, the road's file first, as texts that a recording keeps."""
+    """Return the contents of the files for a recording, with the road's own file first."""
     content = b"".join(f"{name}\0{len(text)}\0".encode() + text for name, text in files.items())
     text = base64.b64encode(zlib.compress(content, 9)).decode()
     return tuple(text[start : start + _PIECE] for start in range(0, len(text), _PIECE))
@@ -61,7 +61,7 @@ def packed(files: Mapping[str, bytes]) -> tuple[str, ...]:
 
 @functools.lru_cache(maxsize=4)
 def unpacked(texts: tuple[str, ...]) -> CrgRoad:
-    """Return the surface of `packed` files."""
+    """Return the surface from packed file contents."""
     try:
         unpacking = zlib.decompressobj()
         content = unpacking.decompress(
@@ -107,7 +107,7 @@ def read_crg(name: str, content_of: Callable[[str], bytes]) -> CrgRoad:
 
 
 def _split(content: bytes) -> tuple[dict[str, list[str]], bytes]:
-    """Split a file into its header, as lines by block, and its data."""
+    """Split a file into its header lines, by block, and its data."""
     end = re.search(rb"^\$\$\$\$[^\r\n]*\r?\n", content, re.MULTILINE)
     head = content[: end.start()] if end else content
     blocks: dict[str, list[str]] = {}
@@ -126,7 +126,7 @@ def _split(content: bytes) -> tuple[dict[str, list[str]], bytes]:
 
 
 def _values(lines: list[str]) -> dict[str, float]:
-    """Return the numbers of a block by their names in small letters."""
+    """Return the numbers of a block by their names in lower case."""
     values = {}
     for line in lines:
         key, sign, text = (part.strip() for part in line.partition("="))
@@ -183,7 +183,7 @@ def _road(head: dict[str, float], mods: dict[str, float], definition: list[str],
 
 
 def _columns(lines: list[str]) -> tuple[list[str], str]:
-    """Return the names of the data columns in small letters, and the format."""
+    """Return the names of the data columns in lower case, and the data format."""
     form = next((line[2:].strip().upper() for line in lines if line.startswith("#:")), "")
     if form not in (*_TEXT_CELLS, *_BINARY):
         raise ManeuverError(f"the data format is {shown(form)}; known are {', '.join((*_TEXT_CELLS, *_BINARY))}")
@@ -195,7 +195,7 @@ def _columns(lines: list[str]) -> tuple[list[str], str]:
 
 
 def _data(data: bytes, form: str, columns: int) -> Array:
-    """Return the data, shape (rows, columns), missing values as nan."""
+    """Return the data, shape (rows, columns), with nan for missing values."""
     if form in _BINARY:
         number = np.dtype(_BINARY[form])
         row = number.itemsize * columns
@@ -226,7 +226,7 @@ def _data(data: bytes, form: str, columns: int) -> Array:
 
 
 def _places(head: dict[str, float], names: list[str]) -> Array:
-    """Return the distances of the long sections to the left of the line [m]."""
+    """Return the lateral positions of the long sections [m]."""
     if all("v =" in name for name in names):
         texts = [name.partition("v =")[2].strip() for name in names]
         return np.array([limits.number_in(text, ManeuverError, key="v of a long section") for text in texts])
@@ -242,12 +242,12 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
 
 
 def _channel(along: Mapping[str, Array], name: str, constant: float, rows: int) -> Array:
-    """Return slope or banking at each row, 0 for missing values."""
+    """Return slope or banking of each row, 0 for missing values."""
     return np.nan_to_num(along[name]) if name in along else np.full(rows, constant)
 
 
 def _filled(heights: Array, mode: int, offset: float) -> Array:
-    """Fill missing heights at the sides, but raise for a hole between heights."""
+    """Fill missing heights at the sides, and raise an error for a hole."""
     missing = np.isnan(heights)
     if not missing.any():
         return heights
@@ -266,7 +266,7 @@ def _filled(heights: Array, mode: int, offset: float) -> Array:
 
 
 def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
-    """Return heights at even distances across, exact at multiples, with the first distance and the step [m]."""
+    """Resample heights at even lateral positions, and return them with the first position and the step [m]."""
     step = float(np.diff(places).min())
     count = max(2, round((places[-1] - places[0]) / step) + 1)
     if heights.shape[0] * count > limits.MAX_CRG_POINTS:
@@ -278,7 +278,7 @@ def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
 
 
 def _line(turn_rad: Array, step_m: float) -> Path | None:
-    """Return the reference line from the heading of each step against the first one, or None if it is straight."""
+    """Return the reference line relative to the first heading, None if it is straight."""
     if np.abs(turn_rad).max() < 1e-9:
         return None
     x, y = (np.concatenate([[0.0], np.cumsum(step_m * function(turn_rad))]) for function in (np.cos, np.sin))

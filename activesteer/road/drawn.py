@@ -1,4 +1,4 @@
-"""Surface of an uneven road as a recording keeps it for drawing: heights along and across the road."""
+"""Surface of an uneven road, as a recording stores it for drawing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _EDGE_M: Final = 1e-3
 
 
 class DrawnSurface(NamedTuple):
-    """Heights, shape (rows, columns), at increasing distances along and to the left of the middle of the road [m]."""
+    """Grid of heights at increasing distances along the road and to the left of its middle line [m]."""
 
     s_m: Array
     d_m: Array
@@ -31,7 +31,7 @@ class DrawnSurface(NamedTuple):
 
     @property
     def plane_below_m(self) -> float:
-        """Height of the plane that is drawn around the surface, below all of it [m]."""
+        """Height of the plane around the surface, below its lowest point [m]."""
         return min(0.0, float(self.z_m.min())) - 0.02
 
     def to_table(self) -> dict[str, Any]:
@@ -39,7 +39,7 @@ class DrawnSurface(NamedTuple):
         return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
 
     def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
-        """Return corners in world axes [m], shape (n, 3), and triangles, anticlockwise from above, shape (m, 3).
+        """Return a mesh of the surface: corners in world axes [m], and triangles, anticlockwise from above.
 
         Each quadrangle is divided along the diagonal that is nearer to level, so that a skew edge is no saw.
         """
@@ -58,7 +58,7 @@ class DrawnSurface(NamedTuple):
 
 
 def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
-    """Return the places along and across a road at which its surface is drawn [m], evenly and at every edge."""
+    """Return the positions along and across a road at which its surface is drawn [m]."""
     count = min(_MAX_ALONG, max(2, round(length_m / _STEP_M)))
     # A skew edge passes a corner of each quadrangle where the steps have the ratio of its slope.
     skew = [abs(math.tan(obstacle.angle_rad)) for obstacle in road.obstacle if obstacle.angle_rad != 0.0]
@@ -78,7 +78,7 @@ def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
 
 
 def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
-    """Return the surface of a recorded run, or None if the road was plane or was not recorded."""
+    """Return the surface of a recorded run, None for a plane road."""
     if "surface" not in metadata:
         return None
     table = table_of(metadata["surface"], "surface")

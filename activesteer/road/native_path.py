@@ -1,4 +1,4 @@
-"""Position of a car along a path, and distances from it: native code, since a driver needs them in every step.
+"""Position of a car relative to a path, in native code because a driver needs it in every step.
 
 A place belongs to the nearest point of the path, so a place has one distance, also where the path crosses itself. Where
 a later pass lies on an earlier one, the earlier pass counts. A grid over the road holds the nearest point of each
@@ -20,7 +20,7 @@ from activesteer.native.compilation import compiled
 
 
 class PathSearch:
-    """Positions along a path and beyond its ends, with `line` as the arguments of the kernels."""
+    """Search along a path and beyond its ends. `line` holds the arguments of the kernels."""
 
     def __init__(self, path: Path) -> None:
         """Prepare the arguments of the kernels."""
@@ -28,16 +28,16 @@ class PathSearch:
         self.line = spacing, path.x_m, path.y_m, float(path.heading_rad[0]), float(path.heading_rad[-1])
 
     def at(self, s_m: Array) -> tuple[Array, Array]:
-        """Return points at arc lengths, also before the start and beyond the end."""
+        """Return points at arc lengths, including points before the start and beyond the end."""
         return _points_at(s_m, *self.line)
 
     def nearest(self, x_m: float, y_m: float, around_m: float, window_m: float) -> float:
-        """Find the arc length of the point of the path nearest to a given point, near its last position."""
+        """Return the arc length of the nearest point of the path, searched near the last position."""
         return nearest(x_m, y_m, around_m, window_m, *self.line)
 
 
 class PathSearches:
-    """Positions of many cars, each along its own path (see `PathSearch`)."""
+    """Searches of many cars, each along its own path (see `PathSearch`)."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         """Prepare the arguments of the kernel."""
@@ -59,7 +59,7 @@ class PathSearches:
 
 @compiled
 def point_at(s, spacing, xs, ys, heading_first, heading_last):
-    """Return one point: linear between points, straight beyond the ends."""
+    """Return one point of a path, linear between its points and straight beyond its ends."""
     last = len(xs) - 1
     place = s / spacing
     if place <= 0.0:
@@ -127,7 +127,7 @@ _ON_EARLIER_M: Final = 1.0
 
 
 class PathGrid(NamedTuple):
-    """Arguments of `along_path`: corner, side and numbers of the cells, and the path.
+    """Arguments of `along_path`: the grid of cells and the path.
 
     `points` holds x and y of its points in turn, shape (2 n,); `cells` the index of the point nearest to each cell's
     centre, row by row.
@@ -144,7 +144,7 @@ class PathGrid(NamedTuple):
 
     @classmethod
     def of(cls, path: Path) -> PathGrid:
-        """Lay the grid over a path."""
+        """Create the grid over a path."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         points = np.column_stack([path.x_m, path.y_m])
@@ -162,7 +162,7 @@ class PathGrid(NamedTuple):
 
 @compiled
 def _direction_at(points, at):
-    """Return the direction of the path at one of its points, a unit vector between its neighbours."""
+    """Return the direction of the path at one of its points as a unit vector."""
     before, after = max(at - 1, 0), min(at + 1, points.size // 2 - 1)
     x, y = points[2 * after] - points[2 * before], points[2 * after + 1] - points[2 * before + 1]
     length = math.sqrt(x * x + y * y)
@@ -171,7 +171,7 @@ def _direction_at(points, at):
 
 @compiled
 def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
-    """Return the place x, y [m] on a path: distance along it and to its left [m], its direction, its curvature [1/m].
+    """Return the position along and to the left of a path [m], its direction and its curvature [1/m].
 
     The direction is that of the tangent, a unit vector. Between two points of the path the direction turns evenly, so
     that a place moves evenly too. The path continues straight beyond its ends. The other arguments are the fields of

@@ -1,4 +1,4 @@
-"""Heights of a road on an even grid, rough roads of ISO 8608, and single obstacles.
+"""Height grids of a road, rough roads of ISO 8608, and single obstacles.
 
 The spectrum of the height along a track is Gd(n) = Gd(n0) (n/n0)^-2 with n0 = 0.1 cycles/m. The surface is isotropic:
 it has this spectrum in every direction. So two tracks at the distance d have the coherence function
@@ -29,7 +29,7 @@ from activesteer.native.records import numbers_type
 
 
 class Grid(NamedTuple):
-    """Heights [m] at even distances along the road (rows) and to the left of its middle (columns), two or more."""
+    """Grid of heights [m] at even distances along the road (rows) and to the left of its middle line (columns)."""
 
     s_m: float
     step_s_m: float
@@ -48,14 +48,14 @@ class Grid(NamedTuple):
         return self.d_m + self.step_d_m * np.arange(self.z_m.shape[1])
 
     def knows(self, s_m: Array, d_m: Array) -> NDArray[np.bool_]:
-        """Return the mask of the places within the grid."""
+        """Return the mask of the positions within the grid."""
         along, across = (s_m - self.s_m) / self.step_s_m, (d_m - self.d_m) / self.step_d_m
         rows, columns = self.z_m.shape
         return (along >= 0.0) & (along <= rows - 1) & (across >= 0.0) & (across <= columns - 1)
 
 
 def summed(fine: Grid, other: Grid) -> Grid:
-    """Return the sum of two grids, constant beyond their edges, on the grid steps of the first one."""
+    """Return the sum of two grids on the steps of the first one, constant beyond their edges."""
     first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
     last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
     s = fine.s_m + fine.step_s_m * np.arange(first, last)
@@ -119,7 +119,7 @@ class Obstacle:
     """Number of waves of a `sine_wave`, or 0 for no end."""
 
     def __post_init__(self) -> None:
-        """Check that all keys of the obstacle's kind are given and that no key is without effect."""
+        """Check that all required keys are given and that no key is without effect."""
         ramp = self.kind == "cross_slope_ramp"
         for key, needed in (
             ("length_m", self.kind != "kerb"), ("height_m", not ramp), ("slope", ramp)
@@ -146,17 +146,17 @@ class Obstacle:
 
     @property
     def borders(self) -> tuple[float, float]:
-        """Right and left border [m], or infinite where there is none."""
+        """Right and left border [m], infinite where none is given."""
         right, left = SIDES[self.side]
         return (right if self.right_m is None else self.right_m), (left if self.left_m is None else self.left_m)
 
     @property
     def is_smooth(self) -> bool:
-        """True if the obstacle hardly bends within the contact patch, so that one point of contact is enough."""
+        """True if the obstacle is smooth within the contact patch, so that one contact point is enough."""
         return _SHAPES[self.kind] != PLATEAU and self.length_m is not None and self.length_m >= _LONG_M
 
     def record(self) -> Any:
-        """Return the obstacle for the kernels, an `OBSTACLE`."""
+        """Return the obstacle as an `OBSTACLE` record for the kernels."""
         right, left = self.borders
         height = self.slope if self.height_m is None else -self.height_m if self.kind == "pothole" else self.height_m
         length = math.inf if self.length_m is None else self.length_m

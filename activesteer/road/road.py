@@ -44,7 +44,7 @@ _SHOWN_BESIDE_M: Final = 4.0
 
 @dataclass(frozen=True)
 class RoadPatch:
-    """A stretch of the track with its own friction, as a table [[road.patches]]."""
+    """A stretch of the road with its own friction, as a table [[road.patches]]."""
 
     start_m: float
     """Start along x or along the path, see `along`; included [m]."""
@@ -67,7 +67,7 @@ class RoadPatch:
 
 @dataclass(frozen=True)
 class BankingTable:
-    """Bank over the distance, smooth through its points, as the table [road.banking]."""
+    """Bank versus distance, smooth through its points, as the table [road.banking]."""
 
     s_m: tuple[float, ...]
     """Distances along x or along the path [m], increasing."""
@@ -83,13 +83,13 @@ class BankingTable:
             raise ManeuverError("is steeper than 45 deg", key="bank_deg")
 
     def sampled(self) -> tuple[float, float, Array]:
-        """Return first distance, step [m] and cross slopes."""
+        """Return the first position, the step [m] and the cross slopes."""
         step_m, banks_rad = sampled(self.s_m, self.bank_rad, _SAMPLE_M)
         return self.s_m[0], step_m, np.tan(banks_rad)
 
 
 class Area(NamedTuple):
-    """A rectangle of the road: x from start (included) to end, y from right to left border (included) [m].
+    """A rectangle of the road [m], from start (included) to end and from right to left border (included).
 
     Its friction is `mu` at the start and changes by `slope_1pm` per metre. On a road along a path, x is the distance
     along the path and y the distance to its left.
@@ -103,7 +103,7 @@ class Area(NamedTuple):
     slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """Return the part of this rectangle within another one [m], or None without an overlap."""
+        """Return the intersection with another rectangle [m], None if empty."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         if not (start < end and right < left):
@@ -113,7 +113,7 @@ class Area(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A quadrangle to be drawn: index of its area, friction in its middle, corners anticlockwise [m], shape (4, 2)."""
+    """A quadrangle for drawing, with the friction in its middle and corners anticlockwise [m]."""
 
     area: int
     mu: float
@@ -204,7 +204,7 @@ class Road:
 
     @property
     def contact_used(self) -> str:
-        """Type of contact on the uneven surface."""
+        """Contact model on the uneven surface."""
         if self.contact != "auto":
             return self.contact
         smooth = not (self._is_gridded or self.is_steep)
@@ -212,7 +212,7 @@ class Road:
 
     @property
     def is_steep(self) -> bool:
-        """True if an obstacle bends the road within the contact patch, as a cleat or a kerb does."""
+        """True if an obstacle is sharp within the contact patch, such as a cleat or a kerb."""
         return not all(obstacle.is_smooth for obstacle in self.obstacle)
 
     def laid(self, course: Course | None) -> Road:
@@ -236,22 +236,22 @@ class Road:
         return LaidRoad(*values, path=course.path)
 
     def grid(self) -> Grid | None:
-        """Return the heights of the surface without obstacles and banking, or None if there are none."""
+        """Return the heights of the surface without obstacles and banking, None if flat."""
         if self.crg_data:
             return unpacked(self.crg_data).grid._replace(s_m=self.start_m)
         grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
         return summed(*grids) if len(grids) > 1 else grids[0] if grids else None
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y of places along and to the left of the middle of the road [m]."""
+        """Convert positions along and to the left of the road's middle line to the world [m]."""
         return s_m, d_m
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return the distances along and to the left of the middle of the road for places in the world [m]."""
+        """Convert positions in the world to positions along and to the left of the road's middle line [m]."""
         return x_m, y_m
 
     def extended_share(self, x_m: Array, y_m: Array) -> float:
-        """Return the fraction of places in the world [m] outside the known surface, where its edge is extended."""
+        """Return the fraction of positions in the world [m] that are outside the known surface."""
         grid = self.grid()
         if grid is None:
             return 0.0
@@ -259,13 +259,13 @@ class Road:
         return float(np.mean(~grid.knows(s, d) & (s >= self.start_m)))
 
     def areas(self) -> tuple[Area, ...]:
-        """Return the areas with a friction other than `mu`, the later one where they overlap."""
+        """Return the areas with a friction other than `mu`. Where they overlap, the later one counts."""
         sides = (("left", self.mu_left), ("right", self.mu_right))
         split = [Area(-math.inf, math.inf, *SIDES[side], mu) for side, mu in sides if mu is not None]
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles that show the areas within a rectangle of the world [m], later ones on top."""
+        """Return the areas of other friction within a rectangle of the world as quadrangles [m], later ones on top."""
         shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
         return [
             piece
@@ -275,7 +275,7 @@ class Road:
         ]
 
     def outlines(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[tuple[str, Array]]:
-        """Return words and corners [m] of the steps and bumps within a rectangle of the world."""
+        """Return label and corners [m] of the steps and bumps within a rectangle of the world."""
         found = []
         for it in self.obstacle:
             if it.height_m is None or it.kind == "sine_wave":
@@ -291,7 +291,7 @@ class Road:
 
 
 def _sliced(index: int, area: Area, slices: int, place: Callable[[Array, Array], tuple[Array, Array]]) -> list[Piece]:
-    """Cut an area into slices, with `place` to turn its x and y into world coordinates."""
+    """Cut an area into slices, and convert their corners to the world with `place`."""
     stations = np.linspace(area.start_m, area.end_m, slices + 1)
     edges = [np.column_stack(place(stations, np.full(slices + 1, y))) for y in (area.right_m, area.left_m)]
     corners = np.stack([edges[0][:-1], edges[0][1:], edges[1][1:], edges[1][:-1]], axis=1)
@@ -314,7 +314,7 @@ class LaidRoad(Road):
     """The path of the course."""
 
     def placed(self, s_m: Array, d_m: Array) -> tuple[Array, Array]:
-        """Return world x and y for distances along and to the left of the path (see the base class)."""
+        """Convert positions along and to the left of the path to the world (see the base class)."""
         path = self.path
         x, y, heading = (np.interp(s_m, path.s_m, line) for line in (path.x_m, path.y_m, path.heading_rad))
         beyond = np.maximum(s_m - path.length_m, 0.0) + np.minimum(s_m, 0.0)
@@ -322,7 +322,7 @@ class LaidRoad(Road):
         return x + beyond * cos - d_m * sin, y + beyond * sin + d_m * cos
 
     def located(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Return distances along and to the left of the path for places in the world (see the base class)."""
+        """Convert positions in the world to positions along and to the left of the path (see the base class)."""
         from scipy.spatial import KDTree  # noqa: PLC0415 - slow to import, and needed for few roads
 
         path = self.path
@@ -332,7 +332,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles along the path. The rectangle has no effect (see the base class)."""
+        """Return all areas of other friction as quadrangles along the path, regardless of the rectangle."""
         path, found = self.path, []
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
@@ -342,12 +342,12 @@ class LaidRoad(Road):
         return found
 
     def outlines(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[tuple[str, Array]]:
-        """Return words and corners along the path, whatever the rectangle (see the base class)."""
+        """Return label and corners of all steps and bumps along the path, regardless of the rectangle."""
         return super().outlines(0.0, self.path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
 
 
 def road_of(metadata: Mapping[str, Any]) -> Road:
-    """Return the road of a recorded run along its course, or a default road if it was not recorded."""
+    """Return the road of a recorded run, a default road if not recorded."""
     maneuver = table_of(metadata.get("maneuver", {}), "maneuver")
     table = table_of(maneuver.get("road", {}), "maneuver.road")
     road = build(Road, table, Source("the metadata of the recording", error=RecordingError), ("maneuver", "road"))

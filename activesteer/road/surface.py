@@ -46,7 +46,7 @@ NEAR_M: Final = 1.0
 
 @compiled
 def _plateau_at(it, x, d):
-    """Return height and slopes along x and d of a step with its edges, x behind its start."""
+    """Return height and slopes of a step at a position."""
     along = min(x, it.length_m - x)
     across = min(d - it.right_m, it.left_m - d)
     height, slope_x, slope_d = it.height_m, 0.0, 0.0
@@ -64,7 +64,7 @@ def _plateau_at(it, x, d):
 
 @compiled
 def _sine_at(it, x):
-    """Return height and slope of a wave that grows over its first period and fades over its last one."""
+    """Return height and slope of a wave that grows in its first period and fades in its last one."""
     part = x / it.length_m
     growth, rate = 1.0, 0.0
     if it.waves > 0.0 and part > it.waves - 1.0:
@@ -78,7 +78,7 @@ def _sine_at(it, x):
 
 @compiled
 def _obstacle_at(it, s, d):
-    """Return height and slopes along s and d of one obstacle."""
+    """Return height and slopes of one obstacle at a position."""
     x, length = s - it.start_m + it.skew * d, it.length_m
     z, slope_x, slope_d = 0.0, 0.0, 0.0
     if x <= 0.0 or not it.right_m < d <= it.left_m:
@@ -101,7 +101,7 @@ def _obstacle_at(it, s, d):
 
 @compiled
 def near_obstacles(obstacles, s, d):
-    """Return first and last (excluded) of the obstacles near a place, and their rise in a tyre's reach [m]."""
+    """Return the range of obstacles near a position, and the rise that they cause in a tyre's reach [m]."""
     first, last, highest = obstacles.size, 0, 0.0
     for index in range(obstacles.size):
         it = obstacles[index]
@@ -123,7 +123,7 @@ def near_obstacles(obstacles, s, d):
 
 @compiled
 def _on_grid(first, per, count, at):
-    """Return index, fraction and points per metre at a place of a table, which is constant beyond its ends."""
+    """Return index, fraction and points per metre at a position of a table, constant beyond its ends."""
     place = (at - first) * per
     if place <= 0.0 or place >= count - 1:
         place, per = min(max(place, 0.0), count - 1.0), 0.0
@@ -133,7 +133,7 @@ def _on_grid(first, per, count, at):
 
 @compiled
 def level_at(surface, numbers, obstacles, first, last, s, d):
-    """Return the height of the road at a place [m] (see `height_at`)."""
+    """Return the height of the road at a position [m] (see `height_at`)."""
     z = 0.0
     rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
     if s > surface.blend_m:
@@ -158,7 +158,7 @@ def level_at(surface, numbers, obstacles, first, last, s, d):
 
 @compiled
 def height_at(surface, numbers, obstacles, first, last, s, d):
-    """Return height [m] and slopes along s and d of the road at a place."""
+    """Return height [m] and slopes of the road at a position."""
     z, z_s, z_d = 0.0, 0.0, 0.0
     rows, columns, count = int(surface.rows), int(surface.columns), int(surface.slopes)
     if s > surface.blend_m:
@@ -198,7 +198,7 @@ def height_at(surface, numbers, obstacles, first, last, s, d):
 
 @compiled
 def rise_at(surface, numbers, s):
-    """Return the rise of the grid in a tyre's reach around a place [m]."""
+    """Return the rise of the grid in a tyre's reach around a position [m]."""
     count = int(surface.rises)
     if count == 0:
         return 0.0
@@ -208,7 +208,7 @@ def rise_at(surface, numbers, s):
 
 @compiled
 def left_grid(surface, s, d):
-    """Return whether a place ahead of the start is outside the grid."""
+    """Return whether a position ahead of the start is outside the grid."""
     if surface.rows == 0.0 or s < surface.start_m:
         return False
     along = (s - surface.grid_s_m) * surface.grid_per_s
@@ -218,7 +218,7 @@ def left_grid(surface, s, d):
 
 @compiled
 def heights_at(surface, numbers, obstacles, s, d):
-    """Return heights and slopes of many places, shape (n, 3)."""
+    """Return heights and slopes at many positions, shape (n, 3)."""
     found = np.empty((len(s), 3))
     for index in range(len(s)):
         first, last, _ = near_obstacles(obstacles, s[index], d[index])
@@ -235,14 +235,14 @@ _REACH_M: Final = 0.4
 
 
 class Surface(NamedTuple):
-    """An uneven road for the kernels: head, shape (1,), numbers, and obstacles in the order of their starts."""
+    """Arrays of an uneven road for the kernels."""
 
     head: NDArray[Any]
     numbers: Array
     obstacles: NDArray[Any]
 
     def at(self, s_m: Array, d_m: Array) -> Array:
-        """Return height [m] and slopes along and across of places."""
+        """Return height [m] and slopes at positions."""
         s, d = np.ascontiguousarray(s_m, np.float64), np.ascontiguousarray(d_m, np.float64)
         return heights_at(self.head[0], self.numbers, self.obstacles, s, d)
 
@@ -276,7 +276,7 @@ def surface_of(road: Road) -> Surface:
 
 
 def _rises(grid: Grid) -> Array:
-    """Return the largest height difference [m] within the reach of a tyre, for each stretch of `_REACH_M`."""
+    """Return the largest height difference within the reach of a tyre [m], for each stretch of the road."""
     per = max(1, int(_REACH_M // grid.step_s_m))
     count = -(-len(grid.z_m) // per)
     padded = np.pad(grid.z_m, ((0, count * per - len(grid.z_m)), (0, 0)), "edge").reshape(count, per, -1)

@@ -1,4 +1,4 @@
-"""A car and its driver as their files describe them, checked before the car is built.
+"""A car and its driver, read from their files and checked before the car is built.
 
 A car has a vehicle file, MJCF, tyres and overrides.
 
@@ -139,7 +139,7 @@ def _parsed(data: bytes, name: str) -> ElementTree.Element:
 
 
 def _walk(root: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, float, int]]:
-    """Yield every element, the number of its copies, and its depth."""
+    """Yield every element with the number of its copies and its depth."""
     stack = [(root, 1.0, 0)]
     while stack:
         element, copies, depth = stack.pop()
@@ -163,7 +163,7 @@ def _included(element: ElementTree.Element, path: Path, mjcf: Path, name: str) -
 
 
 def _check(element: ElementTree.Element, copies: float, name: str) -> None:
-    """Check the amounts that an element requests from the engine."""
+    """Check the sizes that an element requests from the engine."""
     tag = element.tag
     if copies > _MAX_COPIES:
         raise _too_much(f"<{tag}> makes {copies:.3g} copies", _MAX_COPIES, name)
@@ -209,7 +209,7 @@ _DRIVER_HINT: Final = "a vehicle file has no driver: see models/drivers, --drive
 
 @dataclass(frozen=True, kw_only=True)
 class VehicleConfig(VehicleParameters):
-    """A whole vehicle file: the car, and its properties that controllers know."""
+    """A complete vehicle file: the car, and the properties that controllers know."""
 
     single_track: SingleTrackParameters
     """Single-track model of the car, for controllers."""
@@ -315,7 +315,7 @@ class ChosenDriver:
     user_parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def to_table(self) -> dict[str, Any]:
-        """Return the table that is recorded: the driver file, or the parameters of a user's code."""
+        """Return the driver as a table for the recording: its file, or the parameters of a user's code."""
         table = to_table(self.parameters)
         if self.plugin.is_builtin:
             return table
@@ -326,7 +326,7 @@ class ChosenDriver:
         }
 
     def for_searches(self) -> ChosenDriver:
-        """Return the driver of searches before a run: the package's code, which follows the setpoint."""
+        """Return the driver for searches before a run, which follows the setpoint."""
         table = {"name": self.parameters.name}
         return replace(self, plugin=driver_spec(table))
 
@@ -343,7 +343,7 @@ def driver_with(given: Any, overrides: list[Override]) -> ChosenDriver:
 
 
 def split_axles(motors: Motors) -> tuple[SplitAxle, ...]:
-    """Return the axles whose left and right torques can differ, front first."""
+    """Return the axles whose left and right wheels can have different torques, front first."""
     found = []
     for place, axle in zip((0, 2), AXLES, strict=True):
         if not motors.splits(axle):
@@ -374,7 +374,7 @@ _SPEED_MPS: Final = 20.0
 
 
 def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
-    """Return the properties that estimators may use, or None if the vehicle file has no table [two_track]."""
+    """Return the properties that estimators may use, None without a table [two_track]."""
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None

@@ -1,4 +1,4 @@
-"""Overrides: keys of files, controllers and users' blocks that are replaced for one run."""
+"""Overrides: values that replace keys of files, controllers and users' blocks for one run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Override(NamedTuple):
 
 
 def plain(overrides: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Convert NumPy's numbers and arrays in overrides to Python's, because JSON cannot store them."""
+    """Convert NumPy's numbers and arrays in overrides to Python's, which JSON can store."""
     for key in overrides or {}:
         if not isinstance(key, str):
             raise ParameterError(f"the key of an override is text such as 'road.mu', not {shown(key)}", value=key)
@@ -60,14 +60,14 @@ _BUILT_IN: Final = frozenset(field.name for field in fields(ControllerParameters
 
 
 def own_path(key: str) -> tuple[str, str] | None:
-    """Return the class and the parameter of a key of a user's controller, or None for other keys."""
+    """Return class and parameter of a key of a user's controller, None for other keys."""
     table, _, rest = key.removeprefix("vehicle.").partition(".")
     name, _, parameter = rest.partition(".")
     return (name, parameter) if table == "controllers" and name and name not in _BUILT_IN else None
 
 
 def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
-    """Return users' controllers, also of one class with other parameters, by the names that they have in keys."""
+    """Return users' controllers by the names that they have in keys."""
     found: dict[str, list[Plugin]] = {}
     for plugin in map(controller_spec, controllers):
         if not plugin.is_builtin:
@@ -79,7 +79,7 @@ def own_controllers(controllers: Sequence[Any]) -> dict[str, list[Plugin]]:
 
 
 def own_values(overrides: Sequence[Override], controllers: Mapping[str, Sequence[Plugin]]) -> dict[str, dict[str, Any]]:
-    """Return the checked overrides of users' controllers, as values by class and name."""
+    """Return the checked overrides of users' controllers, by class and parameter."""
     given: dict[str, dict[str, Any]] = {}
     for _, (name, parameter), value in overrides:
         given.setdefault(name, {})[parameter] = value
@@ -87,7 +87,7 @@ def own_values(overrides: Sequence[Override], controllers: Mapping[str, Sequence
 
 
 def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Return the overrides of the table [controllers] by key, each as the path of field names to its value."""
+    """Return the overrides of the table [controllers] by key."""
     split = {key: key.removeprefix("vehicle.").split(".") for key in overrides if own_path(key) is None}
     return {
         key: field_path(ControllerParameters, rest) for key, (first, *rest) in split.items() if first == "controllers"
@@ -95,7 +95,7 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
-    """Return the overrides that no controller reads, each with the [controllers] keys that it replaces."""
+    """Return the overrides that no controller reads, with the keys that they set."""
     read = frozenset[str]().union(*map(keys_read, controllers))
     replaced = {
         key: _BUILT_IN.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))

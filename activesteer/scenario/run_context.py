@@ -1,4 +1,4 @@
-"""Contents of the recording of a run apart from its rows: what is needed to repeat and draw it."""
+"""Contents of a recording except its rows, as needed to repeat and draw the run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _BEYOND_M: Final = 30.0
 
 
 class RunContext(NamedTuple):
-    """Contents of a recording apart from its rows."""
+    """Contents of a recording except its rows."""
 
     channels: tuple[Channel, ...]  # the table of channels
     body_names: tuple[str, ...]  # bodies whose poses are recorded
@@ -67,13 +67,13 @@ class RunContext(NamedTuple):
         return cls(vehicle.channels.channels, vehicle.body_names, metadata, files, scene_of(vehicle.model))
 
     def recording(self, time_s: Array, values: Array, poses: Poses) -> Recording:
-        """Return the recording with these rows."""
+        """Return the recording with given rows."""
         return Recording(
             self.channels, time_s, values, poses=poses, metadata=self.metadata, attachments=self.files, scene=self.scene
         )
 
     def writer(self, path: Path) -> McapWriter:
-        """Open a file for the rows."""
+        """Open a file for rows."""
         return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
 
 

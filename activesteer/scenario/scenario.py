@@ -65,7 +65,7 @@ from activesteer.vehicle.parameters import PowertrainLimits
 
 @dataclass(frozen=True)
 class Scenario:
-    """A manoeuvre, a car and a driver, ready to run.
+    """A manoeuvre, a car and a driver, resolved and ready to run.
 
     Attributes:
         maneuver: The manoeuvre.
@@ -85,7 +85,7 @@ class Scenario:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Digest of the resolved parameters, equal for scenarios with the same inputs."""
+        """Digest of the resolved parameters, equal for equal inputs."""
         return hashlib.sha256(json.dumps(describe(self), sort_keys=True, default=str).encode()).hexdigest()
 
     def controller_setup(self, timestep_s: float) -> ControllerSetup:
@@ -193,7 +193,7 @@ _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
 
 
 def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:
-    """Return the manoeuvre with the driven values in its title, if the title of its file contains them."""
+    """Return the manoeuvre with the actual values in its title."""
     title = built.title
     if title != of_file.get("title"):
         return built
@@ -222,7 +222,7 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
 def part_of(
     key: str, kind: type[Maneuver], owned: Mapping[str, Sequence[Plugin]] | None = None
 ) -> tuple[str, list[str]]:
-    """Return the part that an override changes (a name of `_PARTS`, or a user's controllers), and the key inside it.
+    """Return the part of the scenario that an override changes, and its key within the part.
 
     Without `owned`, the users' controllers by their names, a parameter of a user's controller is not checked.
     """
@@ -255,7 +255,7 @@ def part_of(
 
 @functools.lru_cache(1024)
 def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
-    """Return the parts whose table, value or list entry (by its number) a key names."""
+    """Return the parts of a scenario (`maneuver`, `vehicle`) in which a key exists."""
     dotted, of_part = key + ".", {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
     return tuple(
         part
@@ -314,7 +314,7 @@ _SAMPLES: Final = 200
 
 
 def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> tuple[str, Scenario]:
-    """Change one key of a scenario that runs with a controller, at a time of the run [s].
+    """Change one key of a scenario during a run.
 
     Returns:
         The block that must be made anew, `controller` or `driver`, or an empty text, and the changed scenario.
@@ -371,7 +371,7 @@ def _driver(scenario: Scenario, path: list[str], value: Any) -> Any:
 
 
 def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: float) -> Maneuver:
-    """Return a manoeuvre with a changed input, which must have an effect on the rest of the run."""
+    """Return a manoeuvre with a changed input. Reject a change without effect on the rest of the run."""
     field_path(type(before), path)
     after: Maneuver = _with(type(before), to_table(before), path, value, [])
     if after.search is not None:
@@ -387,7 +387,7 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
 
 
 def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
-    """Give a manoeuvre the same course object as another one, so that a driver stays on his path, and return it."""
+    """Return a manoeuvre with the course object of another one, so that a driver stays on his path."""
     if before.course is not None:
         vars(after)["course"] = before.course
     return after
@@ -400,18 +400,18 @@ _ON_GROUND: Final = 0.5
 
 
 def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether a manoeuvre is given as a recording, whose inputs are driven again."""
+    """Return whether a manoeuvre is a recording to repeat."""
     return isinstance(maneuver, (str, os.PathLike)) and os.fspath(maneuver).endswith(".mcap")
 
 
 def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
-    """Advance the steering demand of a manoeuvre by a lag [s], so that the steering wheel angle is as recorded."""
+    """Advance the steering demand of a manoeuvre by the lag of the steering [s]."""
     steering = table["steering"]
     return table | {"steering": steering | {"time_s": [time_s - lag_s for time_s in steering["time_s"]]}}
 
 
 def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
-    """Return the manoeuvre with the steering wheel angle, or rack travel, and the speed of a recording.
+    """Return the manoeuvre that repeats the steering wheel angle, or rack travel, and the speed of a recording.
 
     The manoeuvre starts at the first row of the recording and has its length.
     A recorded brake pedal (`brake_pedal`, 0 to 1) is pressed again; meanwhile the speed is not held.

@@ -1,4 +1,4 @@
-"""Values written into files of vehicles.
+"""Changes of values in vehicle files.
 
 The module edits lines, because tomlkit puts a new key behind the comment that belongs to the next table.
 """

@@ -1,4 +1,4 @@
-"""Sensors between the true motion of the car and its controllers.
+"""Sensors, which turn the true motion of the car into the measurement.
 
 In: the true motion of the car.
 Out: measurements with noise, offset, quantisation and delay.

@@ -1,4 +1,4 @@
-"""The sensors of a car: their constants, their memory, and the native step through them.
+"""The sensors of a car: constants, memory, and native step.
 
 A sensor has bias, drift, bandwidth, sampling, noise, limit and quantisation. Noise is a function of the seed and of the
 number of the sample, so there is no generator whose state has to be kept.
@@ -52,7 +52,7 @@ _UNIT: Final = 2.0**-53
 
 @inlined
 def _uniform(key, number):
-    """Return a random number in (0, 1] for a key and a running number."""
+    """Return a uniform random number in (0, 1] for a key and a counter."""
     x = key + (number + _ONE) * _GOLDEN
     x = (x ^ (x >> _S30)) * _FIRST
     x = (x ^ (x >> _S27)) * _SECOND
@@ -61,7 +61,7 @@ def _uniform(key, number):
 
 @inlined
 def normals(key, number):
-    """Return two independent random numbers of the normal distribution for a key and a running number."""
+    """Return two independent standard normal random numbers for a key and a counter."""
     first = np.uint64(number) * _TWO
     size = math.sqrt(-2.0 * math.log(_uniform(key, first)))
     angle = 2.0 * math.pi * _uniform(key, first + _ONE)
@@ -70,7 +70,7 @@ def normals(key, number):
 
 @inlined
 def _pass_teeth(chain, memory, speed_radps, timestep_s):
-    """Turn the pulse wheel by one step (see `WheelSpeedSensor`)."""
+    """Advance the pulse wheel by one step (see `WheelSpeedSensor`)."""
     at = chain.memory
     turned = speed_radps * timestep_s * chain.teeth / (2.0 * math.pi)
     phase = memory[at + PHASE] + turned
@@ -108,7 +108,7 @@ def _pulse_speed(chain, memory):
 
 @inlined
 def passed_on(chain, memory, truth, timestep_s):
-    """Return the reading of a sensor after one more step."""
+    """Return the reading of a sensor one step later."""
     at = chain.memory
     if chain.teeth > 0.0:
         _pass_teeth(chain, memory, truth, timestep_s)
@@ -165,7 +165,7 @@ class SensorBlock:
         self.outputs = self.memory[: len(MEASURED)]
 
     def reset(self, truth: Measurement) -> None:
-        """Reset the sensors, as if the truth had been constant for a long time."""
+        """Reset the sensors to a true motion that has long been constant."""
         self.memory[:] = 0.0
         self.say(truth)
         for chain, value in zip(self.chains, self.outputs[1:], strict=True):
@@ -175,7 +175,7 @@ class SensorBlock:
             own[LINE:] = value
 
     def say(self, measurement: Measurement) -> None:
-        """Replace the readings until the next step, for example by the readings of a faulty sensor."""
+        """Replace the readings until the next step, for example with those of a faulty sensor."""
         parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
         self.outputs[:] = [number for part in parts for number in part]
 
@@ -197,7 +197,7 @@ def speed_radii(front_fraction: float, rolling_radii_m: Sequence[float]) -> tupl
 
 
 def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float) -> tuple[float, ...]:
-    """Return a record of `CHAIN`, with a random stream that does not depend on the other sensors."""
+    """Return the `CHAIN` record of a sensor, with its own random stream."""
     period = max(1, round((sensor.sample_time_s or 0.0) / timestep_s))
     bandwidth_Hz = sensor.bandwidth_Hz or 0.0
     fraction = 1.0 - math.exp(-2.0 * math.pi * bandwidth_Hz * timestep_s) if bandwidth_Hz else 1.0
@@ -220,7 +220,7 @@ def _chain(sensor: Sensor, place: int, seed: int, index: int, timestep_s: float)
 
 @inlined
 def measure(chains, memory, wheel_radii_m, timestep_s):
-    """Replace the truth in the first numbers of the memory by the readings of the sensors after one more step."""
+    """Replace the true values in the memory by the readings one step later."""
     for index in range(1, _N_OUTPUTS):
         memory[index] = passed_on(chains[index - 1], memory, memory[index], timestep_s)
     from_wheels, counted = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The table [sensors] of a vehicle file: the kinds of sensors, and their errors by a preset and by single values.
+"""The table [sensors] of a vehicle file: kinds of sensors, and their errors.
 
 The default of each key comes from the preset: no error of any kind for `ideal`, those of production.toml for
 `production`.
@@ -25,7 +25,7 @@ _Bandwidth = Annotated[float, Range(0.1, 1e4)]
 
 @dataclass(frozen=True)
 class Sensor:
-    """Keys common to all sensors, without those in the unit of the measured quantity.
+    """Keys of all sensors, except keys in the unit of the measured quantity.
 
     `noise`: white noise of the samples, rms. `bias`: offset of a run, drawn from the seed, rms over seeds. `drift`:
     random walk of the offset, rms of its change within a minute. `quantum`: step of quantisation. `limit`: saturation
@@ -44,11 +44,11 @@ class Sensor:
 
     @property
     def is_ideal(self) -> bool:
-        """True if the output is the truth."""
+        """True if the sensor is ideal."""
         return not any(getattr(self, field.name) for field in fields(self))
 
     def amount(self, word: str) -> float:
-        """Return the value of the key that begins with a word and ends in the unit, or 0 if it is not given."""
+        """Return the value of the key with a prefix, in the unit of the sensor, 0 if not given."""
         return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
 
 
@@ -119,7 +119,7 @@ _KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSe
 
 @dataclass_transform(frozen_default=True)
 def _with_sensors(cls: type[_Class]) -> type[_Class]:
-    """Decorator: turn a class into a frozen dataclass with a field for each sensor, without errors by default."""
+    """Decorator: convert a class into a frozen dataclass with an ideal sensor in each field."""
     for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
         name, _, unit = field.rpartition("_")
         if unit in _KINDS:  # time and speed have none
@@ -131,7 +131,7 @@ def _with_sensors(cls: type[_Class]) -> type[_Class]:
 
 @_with_sensors
 class Sensors:
-    """Sensors between the car and its controllers, by default `ideal`.
+    """Sensors of a car, ideal by default.
 
     Each signal of a `Measurement` but time and speed has a sensor, whose table has the name of the signal without its
     unit: `yaw_rate`, `ay`, `wheel_speed`. The wheels share one table.
@@ -178,7 +178,7 @@ class Sensors:
 
     @property
     def is_ideal(self) -> bool:
-        """True if the measurement is the truth."""
+        """True if all sensors are ideal."""
         return not self.speed_from_wheels and all(sensor.is_ideal for sensor in self.all().values())
 
 
@@ -188,7 +188,7 @@ def _production() -> Sensors:
 
 
 def _filled(given: Any, preset: Any) -> Any:
-    """Return the given values, or the preset's values where they are missing."""
+    """Return the given values, completed by the values of the preset."""
     if not isinstance(preset, Sensor):
         return preset if given is None else given
     return replace(preset, **{key: value for key, value in vars(given).items() if value is not None})

@@ -1,4 +1,4 @@
-"""The 1 ms loop, the searches and recorders around it, and one run from its inputs to a recording.
+"""The 1 ms loop, its searches and recorders, and complete runs.
 
 In: a `Scenario` with a controller and a driver.
 Out: recordings, or measurements step by step.

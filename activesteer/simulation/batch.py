@@ -1,4 +1,4 @@
-"""Batch of many cars, each with its own numbers, driven by one native call without Python's lock."""
+"""Batch of many cars with individual numbers, driven by one native call without Python's lock."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _WHEEL_TORQUES: Final = [
 
 
 class Batch(Copyable):
-    """N independent cars in one manoeuvre, each with its own overrides.
+    """N independent cars in one manoeuvre, with individual overrides.
 
     All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
     to that of a `Simulation` with the same inputs, for any number of cars and threads.
@@ -125,7 +125,7 @@ class Batch(Copyable):
         self._build()
 
     def _of_different_cars(self, function: Callable[[int], Any], keys: Sequence[Any]) -> dict[Any, Any]:
-        """Call a function with the first car of each key, on all threads, and return its results by key."""
+        """Call a function with the first car of each key on all threads, and return the results by key."""
 
         def call(car: int) -> Any:
             with _named(car):
@@ -136,7 +136,7 @@ class Batch(Copyable):
             return dict(zip(first, pool.map(call, first.values()), strict=True))
 
     def _build(self) -> None:
-        """Build the loops, and let only the first car of each scenario settle."""
+        """Create the loops. Only the first car of each scenario settles."""
 
         def settled(car: int) -> ClosedLoop:
             return ClosedLoop(self.scenarios[car], self._controller, self._timestep_s)
@@ -178,7 +178,7 @@ class Batch(Copyable):
 
     @property
     def done(self) -> NDArray[np.bool_]:
-        """True for each car at the end of its manoeuvre, and for each car that has diverged."""
+        """True for each car that has finished its manoeuvre or diverged."""
         done = self._records["step"] >= self._last
         done[list(self.failures)] = True
         return done
@@ -204,7 +204,7 @@ class Batch(Copyable):
         return arrays_of(ActuatorCommand, self.rows(ActuatorCommand))
 
     def rows(self, kind: type[Any], cars: NDArray[np.intp] | slice = slice(None)) -> Array:
-        """Return the numbers of current messages, a copy of shape (cars, numbers) (see `signals.arrays_of`).
+        """Return a copy of the numbers of current messages, shape (cars, numbers) (see `signals.arrays_of`).
 
         Args:
             kind: `Measurement`, `Motion`, `DriverCommand` or `ActuatorCommand`.
@@ -263,7 +263,7 @@ class Batch(Copyable):
         return self.measurement
 
     def _call(self, records: NDArray[Any]) -> None:
-        """Drive all cars natively, with an equal share of the next steps for each thread."""
+        """Drive all cars natively, with equal shares of the cars for all threads."""
         in_python = np.zeros(len(records), dtype=bool)
         for block in ("driver", "controller"):
             in_python |= (records[f"{block}_kind"] == PYTHON) & (records[f"{block}_given"] == 0)

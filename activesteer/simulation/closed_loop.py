@@ -1,4 +1,4 @@
-"""Closed loop of one car: its blocks, its record, the work of Python between native steps, and changes.
+"""Closed loop of one car: blocks, record, work in Python between native steps, and changes.
 
 While a car is driven, the state of native blocks and of the controller's bus is in its record.
 """
@@ -62,14 +62,14 @@ _STATE: Final = (*native.MESSAGES, "step", "torques_set", "torques_Nm", "control
 
 
 class NonReentrantLock:
-    """A context that a second caller cannot enter while the first is inside."""
+    """A context that rejects a second caller."""
 
     def __init__(self) -> None:
-        """Create a context that is free to enter."""
+        """Create an unlocked context."""
         self._lock = threading.Lock()
 
     def __enter__(self) -> None:
-        """Enter the context, or raise an error if another caller is inside."""
+        """Acquire the lock, or raise an error if another caller holds it."""
         if not self._lock.acquire(False):
             raise ManeuverError(
                 "this simulation is already being driven, by another thread or by the caller of its own block; use a "
@@ -83,7 +83,7 @@ class NonReentrantLock:
 
 @dataclass(frozen=True)
 class LoopState:
-    """State for the bit-identical continuation of a loop, with the inputs of the loops that it belongs to."""
+    """Saved state of a loop for a bit-identical continuation, with the inputs of compatible loops."""
 
     inputs: tuple[Any, ...]
     engine: NDArray[np.float64]
@@ -180,7 +180,7 @@ class ClosedLoop(Uncopyable):
             self.restore_state(settled)
 
     def join(self, records: NDArray[Any], place: int, tables: SharedTables) -> None:
-        """Move the record of the car to a place in the records of a batch, whose cars share tables."""
+        """Move the record of the car into the records of a batch, whose cars share tables."""
         records[place] = self._record[0]
         self._record = record = records[place : place + 1]
         self._tables = tables
@@ -198,7 +198,7 @@ class ClosedLoop(Uncopyable):
         )
 
     def _connect(self) -> None:
-        """Connect a new controller to its bus, which is empty."""
+        """Connect a new controller to an empty bus."""
         record, unit = self._record, self.unit
         self._bus = np.zeros((unit.delay + 1, N_HELD))
         record["bus"]["address"], record["bus"]["size"] = self._bus.ctypes.data, self._bus.size
@@ -207,7 +207,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def driver(self) -> Any:
-        """The driver, who may be replaced from the next step on."""
+        """Driver of the loop. You may replace him from the next step on."""
         self._store()
         return self.blocks[0]
 
@@ -218,7 +218,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def controller(self) -> Any:
-        """The controller, which may be replaced from the next step on and then keeps its control unit."""
+        """Controller of the loop. You may replace it from the next step on; the control unit stays."""
         self._store()
         return self.blocks[1]
 
@@ -248,7 +248,7 @@ class ClosedLoop(Uncopyable):
         self._maneuver = maneuver
 
     def _setpoint_at(self, step: int) -> Setpoint:
-        """Return the setpoint of a step, in a manoeuvre of phases from the current phase."""
+        """Return the setpoint of a step."""
         if self.settling is not None:
             return self.settling
         time_s = step * self.vehicle.timestep_s
@@ -335,7 +335,7 @@ class ClosedLoop(Uncopyable):
         self.changes = (*self.changes, (key, value, time_s))
 
     def _new_block(self, part: str, scenario: Scenario) -> Any:
-        """Create the driver or the controller of a scenario, and record the properties that it may know."""
+        """Create the driver or the controller of a scenario, and record the properties of the car that it knows."""
         if part == "controller":
             self.controller_setup, _, block = control_unit(self._plugin, scenario, self.vehicle)
             return block
@@ -346,7 +346,7 @@ class ClosedLoop(Uncopyable):
         return block
 
     def _adopt(self, scenario: Scenario) -> None:
-        """Take over a changed scenario, apart from driver and controller."""
+        """Adopt a changed scenario, except driver and controller."""
         if scenario.maneuver is not self.scenario.maneuver:
             self.vehicle.change_road(scenario.maneuver.ground)
         self.scenario, self.maneuver = scenario, scenario.maneuver
@@ -376,7 +376,7 @@ class ClosedLoop(Uncopyable):
             self.drive(steps, recorder, given)
 
     def drive(self, steps: int, recorder: Recorder | None = None, given: Given = _NOTHING_GIVEN) -> None:
-        """Drive a number of steps inside `in_use` (see `advance`)."""
+        """Drive a number of steps, with the loop locked (see `advance`)."""
         vehicle, record = self.vehicle, self._record
         driver_command, actuator_command = given
         if driver_command is not None:
@@ -486,7 +486,7 @@ class ClosedLoop(Uncopyable):
             self._record["torques_Nm"] = torque_numbers(torques)
 
     def _give_actuator_command(self, command: Any) -> None:
-        """Pass the car a command that reaches its actuators immediately."""
+        """Send the car a command that takes effect at once."""
         write_command(ActuatorCommand, self._actuator_at, command)
         self._check_driven(command)
         if command.estimate is not None:
@@ -505,7 +505,7 @@ class ClosedLoop(Uncopyable):
         return new_message(DriverCommand, (angle, drive, pedal, saturated != 0.0, torques, int(gear), front, parking))
 
     def _change_faults(self) -> None:
-        """Let the faults of a step begin and end."""
+        """Start and end the faults of a step."""
         step = self.step_count
         self.faults.act(step)
         ratio = self.unit.steering_ratio
@@ -584,7 +584,7 @@ _ACTS: Final[dict[int, Callable[[ClosedLoop], None]]] = {
 
 
 def _arrived(bus: Array, calls: Any) -> Array:
-    """Return the command that arrives from a bus after some calls."""
+    """Return the command that a bus delivers after some calls."""
     return bus[int(calls[0]) % len(bus)]
 
 
@@ -595,7 +595,7 @@ def _drive_all(records: NDArray[Any]) -> None:
 def drive_together(
     loops: Sequence[ClosedLoop], records: NDArray[Any], call: Callable[[NDArray[Any]], None] = _drive_all
 ) -> dict[int, SimulationDiverged]:
-    """Drive each car for the steps in `left`, let Python act at each stop, and return the diverged cars."""
+    """Drive each car for the steps in `left`, execute Python blocks at each stop, and return the diverged cars."""
     failed, status, several = {}, records["status"], len(records) > 1
     while True:
         call(records)

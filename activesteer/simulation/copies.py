@@ -1,4 +1,4 @@
-"""Base of objects that run and can be copied: one mechanism for copy, deepcopy and pickle, by inputs and state."""
+"""Base of running objects that can be copied and pickled by their inputs and state."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.plugins import in_one_line, is_user_module
 
 
 class Copyable:
-    """Base of objects that are copied as inputs and state, and built again from them."""
+    """Base of objects that are copied as inputs and state, and rebuilt from them."""
 
     def _portable(self) -> Any:
         """Return inputs and state, without native memory."""

@@ -1,4 +1,4 @@
-"""Drive in a window: the simulation at the pace of a clock, and the scene that shows it."""
+"""Live view: the simulation at the pace of a clock, and its scene."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _TURN_S: Final = 0.4
 
 
 class FramePacer:
-    """Pacer that keeps simulated time in step with a clock.
+    """Pacer that synchronises simulated time with a clock.
 
     Attributes:
         speed: Simulated seconds per second of the clock.
@@ -51,7 +51,7 @@ class FramePacer:
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], object] = time.sleep,
     ) -> None:
-        """Store a clock, which starts with the first frame."""
+        """Set the clock, which starts with the first frame."""
         self.speed, self._clock, self._sleep = speed, clock, sleep
         self._start_s: float | None = None
         self.lost_s = 0.0
@@ -61,7 +61,7 @@ class FramePacer:
         self.speed, self._start_s = min(max(self.speed * factor, _SLOWEST), _FASTEST), None
 
     def wait(self) -> None:
-        """Wait for the duration of one frame without simulated time."""
+        """Wait for the duration of one frame while simulated time stands still."""
         self._sleep(FRAME_S)
         self._start_s = None
 
@@ -96,7 +96,7 @@ class Keys:
         self.faster = 1.0
 
     def __call__(self, code: int) -> None:
-        """Handle one of our keys, given by its GLFW code, which is the upper-case letter."""
+        """Handle a key of the window, given by its GLFW code."""
         if code == ord(" "):
             self.paused = not self.paused
         elif code == ord("R"):
@@ -154,7 +154,7 @@ def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FrameP
 
 
 class _Follow:
-    """Camera that moves with the car at the direction and distance that the user chooses."""
+    """Camera that follows the car at the direction and distance that the user chooses."""
 
     def __init__(self, simulation: ClosedLoop) -> None:
         self._simulation = simulation
@@ -177,7 +177,7 @@ class _Follow:
 
 
 def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool) -> tuple[str, str]:
-    """Return names and values, one line each, and the keys."""
+    """Return the lines of the overlay: names and values, and the keys."""
     vehicle = simulation.vehicle
     measured, motion = vehicle.measure(), vehicle.motion()
     moving = motion.speed_mps > SLOWEST_MPS
@@ -198,7 +198,7 @@ def _texts(simulation: ClosedLoop, time_s: float, speed: float, *, paused: bool)
 
 
 def check_display() -> None:
-    """Check that there is a display with OpenGL, without which the viewer would wait forever."""
+    """Check that there is a display with OpenGL. Without one, the viewer would wait forever."""
     import glfw  # noqa: PLC0415 - looks for its library when it is imported
 
     with warnings.catch_warnings(record=True) as caught:
@@ -218,7 +218,7 @@ def check_display() -> None:
 
 
 def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> None:
-    """Drive a scenario again and again in a window until it is closed, without a recording."""
+    """Drive a scenario repeatedly in a window until it is closed, without a recording."""
     import mujoco.viewer  # noqa: PLC0415 - needs a display
 
     simulation, keys = ClosedLoop(scenario, controller), Keys()
@@ -246,7 +246,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the viewer's thread at the end, because otherwise the shutdown of Python crashes."""
+    """Wait for the viewer's thread at the end, to prevent a crash at the shutdown of Python."""
     before = set(threading.enumerate())
     try:
         yield

@@ -145,7 +145,7 @@ def _control(car):
 
 @inlined
 def _pass_on(car):
-    """Put the held command on the bus, and take the arriving one."""
+    """Send the held command over the bus, and receive the arriving one."""
     length, bus = car.on_bus + 1, array_of(car.bus)
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):
@@ -186,7 +186,7 @@ def _advance(car, bindings, step_address):
 
 @compiled_call(types.void, types.Array(from_dtype(CAR), 1, "C"), types.intp, types.intp, types.intp)
 def drive_cars(cars, first, last, step_address):
-    """Drive each of several cars for the number of steps in `left`, or until Python must act."""
+    """Drive each car for the number of steps in `left`, or until Python must act."""
     for index in range(first, last):
         car = cars[index]
         bindings = carray(native_step._bindings_pointer(car.bindings), (1,))[0]

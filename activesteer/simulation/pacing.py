@@ -1,4 +1,4 @@
-"""Pace of a run by the clock: each step begins at its own time, and delays are recorded."""
+"""Real-time pace of a run: each step starts at its time by the clock, and delays are recorded."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RealtimePacer:
         self._steps += 1
 
     def report(self) -> dict[str, Any]:
-        """Return the values for the recording: missed deadlines, and the delay of the steps [s]."""
+        """Return the statistics for the recording: missed deadlines and delays of the steps [s]."""
         late_s = self._late_s[: self._steps]
         p50, p99, most = (float(np.quantile(late_s, q)) for q in (0.5, 0.99, 1.0)) if self._steps else (0.0,) * 3
         return {

@@ -1,4 +1,4 @@
-"""Preparation of a scenario: a settled car, the search for a steering amplitude, and the store of amplitudes.
+"""Preparation of a scenario: settling, search for a steering amplitude, and store of amplitudes.
 
 A found amplitude is the input for every controller. It is kept under a key of everything that it depends on, in the
 process and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete
@@ -56,7 +56,7 @@ _writes = True
 
 
 def folder() -> Path:
-    """Return the folder of the stored amplitudes, which may not exist."""
+    """Return the folder of the stored amplitudes. It may not exist."""
     given = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # XDG base directory specification: ignore a path that is not absolute.
     cache = given if given.is_absolute() else Path.home() / ".cache"
@@ -64,7 +64,7 @@ def folder() -> Path:
 
 
 def recall(key: str) -> float | None:
-    """Return a stored amplitude, bit-identical, or None if there is none."""
+    """Return a stored amplitude, or None."""
     if key not in _in_process:
         with contextlib.suppress(ActiveSteerError, RuntimeError, ValueError):
             text = read_bytes(folder() / f"{key}{_SUFFIX}", ActiveSteerError, _MAX_BYTES).decode("ascii")
@@ -98,7 +98,7 @@ def keep(key: str, value: float) -> None:
 
 @contextlib.contextmanager
 def not_on_disk() -> Iterator[None]:
-    """Keep amplitudes found in this context only in the process, because the cars of a study do not recur."""
+    """Context that keeps new amplitudes only in the process, because the cars of a study do not recur."""
     global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
     before, _writes = _writes, False
     try:
@@ -145,7 +145,7 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
 
 
 def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
-    """Digest of everything that the amplitude depends on.
+    """Return a digest of everything that affects the amplitude.
 
     The compiled model includes the content of all model and tyre files, the road and the step. Controllers have no
     influence, because the car is driven without control.
@@ -164,7 +164,7 @@ def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
 
 
 def _steady_turn(scenario: Scenario, probe: StepSteer, wanted: float, timestep_s: float) -> float:
-    """Secant search over whole step steers."""
+    """Search with the secant method over complete step steers."""
     if wanted == 0.0:
         return 0.0
     car, speed = scenario.car.config.single_track, max(probe.speed_mps, 1.0)
@@ -207,7 +207,7 @@ def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any
 
 
 def _ramp_angle(scenario: Scenario, wanted: float, timestep_s: float) -> float:
-    """Evaluate the regression line of the lateral acceleration over the angle at the required acceleration.
+    """Return the steering wheel angle at a lateral acceleration, from a regression line over a slow ramp.
 
     The model is symmetric, so one side represents both.
     """
@@ -256,7 +256,7 @@ class Body(NamedTuple):
 
 
 def identified(car: CarSpec) -> SingleTrackParameters:
-    """Return the single-track model of a car as it is, including its load, from tests in the linear range."""
+    """Return the single-track model of the loaded car from tests in the linear range."""
     body = body_of(car)
     keys = [{**_LINEAR, "speed_kmh": speed} for speed in CONSTANT_SPEED_TESTS.values()]
     tests = [replace(resolve("slowly_increasing_steer", overrides=each), car=car) for each in keys]
@@ -306,7 +306,7 @@ def fitted(body: Body, tests: list[dict[str, float]]) -> SingleTrackParameters:
 
 
 def searched_angle(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> float | None:
-    """Return the steering wheel angle that the search of the manoeuvre finds [rad], or None if it has no search."""
+    """Return the steering wheel angle from the search of the manoeuvre [rad], None without a search."""
     # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
     search = replace(scenario.maneuver, fault=()).search
     if search is None:
@@ -317,7 +317,7 @@ def searched_angle(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -
 def with_amplitude_found(
     scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S, angle_rad: float | None = None
 ) -> Scenario:
-    """Return the scenario with the results of all searches: single-track model, steering wheel amplitude.
+    """Return the scenario with the results of all searches.
 
     Args:
         scenario: A scenario.
@@ -348,7 +348,7 @@ def prepared(
     driver: Any,
     timestep_s: float,
 ) -> Scenario:
-    """Return the scenario that the arguments of a `Simulation` describe, with the results of all searches."""
+    """Return the scenario for the arguments of a `Simulation`, with the results of all searches."""
     if not isinstance(maneuver, Scenario):
         maneuver = resolve(maneuver, vehicle, overrides, driver, [controller])
     elif overrides or vehicle != "compact" or driver != DEFAULT_DRIVER:

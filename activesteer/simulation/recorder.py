@@ -1,4 +1,4 @@
-"""Recorder of a run: rows of channels block by block, and the data that repeat and draw the run."""
+"""Recorder of a run: blocks of rows, and the data that repeat and draw the run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _TAPE_ROWS: Final = 125
 
 @dataclass
 class _Kept:
-    """Rows and poses in memory. The first `referred_rows` are shared and never overwritten."""
+    """Rows and poses in memory. The first `referred_rows` rows are shared and never overwritten."""
 
     values: NDArray[np.float64]
     positions_m: NDArray[np.float64]
@@ -115,7 +115,7 @@ class Recorder(Uncopyable):
             self._take()
 
     def _rewind(self) -> None:
-        """Direct the next row to the start of the tape, and the next pose behind the kept ones."""
+        """Direct the next row to the start of the tape, and the next pose to the end of the stored ones."""
         tape, kept = self._tape, self._kept
         self.tape.memory = self._raw, kept
         pose = self._poses_before(self._taken) - self._poses_before(self._first)
@@ -143,7 +143,7 @@ class Recorder(Uncopyable):
         return raw if count == len(raw.sensordata) else type(raw)(*(array[:count] for array in raw))
 
     def flush(self, *, checked: bool = True) -> None:
-        """Turn the rows since the last flush into channels, and write them."""
+        """Convert the rows since the last flush into channels, and write them."""
         self._take()
         first, last = self._flushed, self.rows
         if first == last:
@@ -183,7 +183,7 @@ class Recorder(Uncopyable):
         return {channel.name: float(value) for channel, value in zip(self.channels, values[row], strict=True)}
 
     def save_state(self) -> RecordedRows:
-        """Return the rows recorded so far, which later rows do not change."""
+        """Return the rows recorded so far. Later rows do not change them."""
         self.flush()
         self._kept.referred_rows = max(self._kept.referred_rows, self.rows)
         return RecordedRows(self._kept, self.rows, self._yaw_rad)
@@ -207,7 +207,7 @@ class Recorder(Uncopyable):
         self._rewind()
 
     def _complaint(self, first: int, values: NDArray[np.float64], poses: Poses) -> SimulationDiverged:
-        """The error for a block with a value that is not finite."""
+        """Error for a block with a value that is not finite."""
         wrong = ~(np.abs(values) <= MAX_VALUE)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))

@@ -1,4 +1,4 @@
-"""One run from its inputs to a recording: `simulate`, and the same with a file."""
+"""Complete runs: `simulate`, and a run of a scenario into a file."""
 
 from __future__ import annotations
 

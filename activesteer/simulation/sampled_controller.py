@@ -1,4 +1,4 @@
-"""The control unit around a controller: sampling rate, delay of the bus, source of the driver's demand."""
+"""The control unit around a controller: sampling, bus delay, and source of the driver's demand."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def control_unit(
 
 
 def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) -> ControllerSetup:
-    """Give the controller the rates of slower actuators, unless an override sets these rates."""
+    """Tell the controller the rates of slower actuators, unless an override sets these rates."""
     rates, servos, gains = steering_rates(vehicle.model, scenario.car.config), setup.gains.servos, setup.gains
     slower = {
         name: rate_radps
@@ -57,7 +57,7 @@ def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) ->
 
 
 def slow_actuators(plugin: Plugin, scenario: Scenario, vehicle: Vehicle) -> str:
-    """Return a description of the actuators that are slower than the controller needs, empty if there are none."""
+    """Describe the actuators that are slower than the controller needs, empty without any."""
     needed = getattr(plugin.origin, "rates_radps", {})
     rates = steering_rates(vehicle.model, scenario.car.config)._asdict() if needed else {}
     return "; ".join(

@@ -1,4 +1,4 @@
-"""A recorded run, driven step by step, by the blocks of the loop or by your commands."""
+"""A recorded run that is driven step by step, by its blocks or by your commands."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ _COARSE: Final = (
 
 
 class Link(Protocol):
-    """Another process that gives commands, with `name` as the key of its `report` in the recording."""
+    """Another process that gives commands. Its `report` has the key `name` in the recording."""
 
     name: str
     report: dict[str, int]
 
     def connect(self, check: Callable[[Given, str], Given]) -> None:
-        """Receive the function that checks and completes commands, with errors that name the source of a command."""
+        """Set the function that checks and completes commands."""
 
     def commands(self) -> Given:
-        """Return the commands for the next step, with None where the run's own block decides."""
+        """Return the commands for the next step, None where the run's own block decides."""
         ...
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:
@@ -66,7 +66,7 @@ class Link(Protocol):
 
 @dataclass(frozen=True)
 class SavedState:
-    """State for the bit-identical continuation of a simulation, with the rows recorded so far."""
+    """Saved state of a simulation for a bit-identical continuation, with the rows recorded so far."""
 
     metadata: dict[str, Any]
     loop: LoopState
@@ -247,7 +247,7 @@ class Simulation(Copyable):
                     self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
 
     def _drive_by_the_clock(self, steps: int, given: Given) -> None:
-        """Drive steps one by one, each at its time and with the commands that have arrived until then."""
+        """Drive steps one by one at their times by the clock, with the commands that have arrived."""
         pacer, link, loop = self._pacer, self._link, self.loop
         collects = gc.isenabled()
         gc.disable()  # a collection takes longer than a step
@@ -452,7 +452,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Write a file while the context is active and the run proceeds.
+        """Context in which a run proceeds and its file is written.
 
         Enter the context before the first step.
 
@@ -473,7 +473,7 @@ class Simulation(Copyable):
             yield
 
     def end_file(self, recording: Recording) -> None:
-        """Write outcome and metrics of the run at the end of its file, if there is a file."""
+        """Write outcome and metrics of the run at the end of its file, if any."""
         if self._writer is not None:
             known = self.context.metadata
             outcome = {key: value for key, value in recording.metadata.items() if key not in known}
@@ -481,7 +481,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Record a failure, after which the states of the blocks do not match, and keep the recorded rows."""
+        """Record a failure, and keep the recorded rows. The states of the blocks no longer match."""
         try:
             yield
         except BaseException as failure:

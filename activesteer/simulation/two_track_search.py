@@ -1,4 +1,4 @@
-"""Search for the two-track properties of a car by driving it: steps of the steering wheel, and braking.
+"""Search for the two-track properties of a car in driven tests: steering steps, and braking.
 
 The steering wheel turns to one side and then to the other for about 2 m/s2 each. While the car turns steadily, the
 difference between both sides gives load transfer and roll angle over lateral acceleration. Natural frequency and
@@ -116,7 +116,7 @@ def _channel(recording: RecordingLike, name: str) -> Array:
 
 
 def _between_sides(recording: RecordingLike, values: Array) -> float:
-    """Return the change of a value from the steady turn to the right to the turn to the left."""
+    """Return the difference of a value between steady turns to the left and to the right."""
     left, right = (
         float(values[(recording.time_s >= begin) & (recording.time_s <= end)].mean()) for begin, end in _STEADY_S
     )
@@ -140,7 +140,7 @@ def _roll(ay: Array, roll: Array, gradient: float, step_s: float) -> tuple[float
 
 
 def _slip_and_motion(turned: RecordingLike, axle: str, to_axle_m: float) -> tuple[Array, Array, Array, Array, float]:
-    """Return the arguments of `_roll_arm`, for an axle in front of the centre of gravity by a distance."""
+    """Return the arguments of `_roll_arm` for an axle at a distance ahead of the centre of gravity."""
     slip, steer = (
         0.5 * (_channel(turned, f"{axle}l_{name}_rad") + _channel(turned, f"{axle}r_{name}_rad"))
         for name in ("slip_angle", "steer")
@@ -189,5 +189,5 @@ def _pitch_gradient(recording: RecordingLike) -> float:
 
 
 def two_track_lines(parameters: TwoTrackParameters) -> dict[str, str]:
-    """Return keys and values of the table [two_track], rounded to the resolution of the tests."""
+    """Return the entries of the table [two_track], rounded to the resolution of the tests."""
     return {key: f"{value:.{5 if 'gradient' in key else 3}f}" for key, value in vars(parameters).items()}

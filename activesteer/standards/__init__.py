@@ -1,4 +1,4 @@
-"""Whole tests of standards: their runs on the study engine, their evaluation, and their verdict against limits.
+"""Tests by standards: runs on the study engine, evaluation, and verdicts against limits.
 
 `standards.toml` says what each standard covers, and a function of a module drives it. `examination` judges the test and
 writes its page.

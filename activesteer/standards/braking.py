@@ -1,4 +1,4 @@
-"""Braking: straight-line stop (ISO 21994), on split friction (ISO 14512), and in a turn (ISO 7975)."""
+"""Braking tests: straight-line stop (ISO 21994), split friction (ISO 14512), and in a turn (ISO 7975)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BRAKE_S: Final = 0.5
 
 
 def corrected_distance(distance_m: float, speed_mps: float, nominal_mps: float) -> float:
-    """Return the stopping distance at the nominal speed [m], in proportion to the square of the speed."""
+    """Return the stopping distance [m], scaled to the nominal speed by the square of the speed."""
     return distance_m * (nominal_mps / speed_mps) ** 2
 
 
@@ -64,7 +64,7 @@ _SPLIT_CHANNELS: Final = ("yaw_rate_radps", "yaw_rad", "y_m", "speed_mps")
 
 
 def after_one_second(run: StandardRun, begin_s: float) -> dict[str, float]:
-    """Return the motion of the car 1 s after the start of braking, left positive, or nan if the run ends before."""
+    """Return the motion of the car 1 s after the start of braking, nan if the run ends before."""
     then_s = begin_s + AFTER_S
     return {
         "yaw_rate_after_1000ms_radps": run.at("yaw_rate_radps", then_s),

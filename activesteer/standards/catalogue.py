@@ -1,4 +1,4 @@
-"""The available standards, with the scope that each page states, from standards.toml."""
+"""The available standards, with the scope on their pages, from standards.toml."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from activesteer.resources import DEFAULT_DRIVER
 
 @dataclass(frozen=True)
 class Standard:
-    """A standard, with its implemented parts."""
+    """A standard, with its implemented and missing parts."""
 
     title: str
     edition: str  # its edition, and the source of the text

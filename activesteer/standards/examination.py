@@ -1,4 +1,4 @@
-"""Test by a standard: drive and evaluate each controller, and write the result as a page."""
+"""Test by a standard: runs and evaluation for each controller, and the page of the results."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Examination:
 
     @property
     def failed(self) -> list[str]:
-        """Controllers whose car breaks a limit or cannot be tested."""
+        """Controllers with which the car breaks a limit or cannot be tested."""
         return [name for name, found in self.findings.items() if found.passed is False or found.error]
 
     def to_json(self) -> dict[str, Any]:
@@ -148,7 +148,7 @@ def examination_page(result: Examination) -> Page:
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
-    """Return overlaid plots of several controllers by title, or none for a single controller.
+    """Return overlaid plots of several controllers by title, None for a single controller.
 
     A controller has one colour. Of two curves of a panel, such as the turns to the left and to the right, the first is
     wide and pale, the second thin. Pictures with more curves stay with their controller.
@@ -173,7 +173,7 @@ def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
 
 
 def _overlays(parts: Sequence[Panel | Heat]) -> bool:
-    """Return whether panels of several controllers can be told apart in one."""
+    """Return whether the panels of several controllers remain legible as one."""
     return all(
         isinstance(panel, Panel)
         and len(panel.curves) <= _SIDES

@@ -35,7 +35,7 @@ _RAMP: Final = {"steer.end_deg": 120.0, "duration_s": 10.0, "road.mu": 0.9}
 
 
 def amplitudes(a_deg: float) -> list[tuple[float, float]]:
-    """Return the amplitudes of a series."""
+    """Return the amplitudes of a test series."""
     last = LAST_FACTOR * a_deg
     last = MOST_DEG if last > MOST_DEG else max(last, LEAST_LAST_DEG)
     found = []
@@ -47,7 +47,7 @@ def amplitudes(a_deg: float) -> list[tuple[float, float]]:
 
 
 def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
-    """Return descriptions of the limits that a run exceeds, for a required displacement [m], empty if it keeps them."""
+    """Describe the limits that a run exceeds, empty if it keeps them."""
     broken = [
         f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
         for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)
@@ -95,7 +95,7 @@ def examine(runner: StandardRunner) -> Findings:
 
 
 def _reference_angle(runner: StandardRunner) -> tuple[float, dict[str, list[float]]]:
-    """Return A [deg], the mean of six slow ramps, and the angles of the ramps by side, rounded to 0.1 deg."""
+    """Return the mean angle A [deg] of six slow ramps, and the angle of each ramp."""
     sensors = runner.scenario("slowly_increasing_steer").car.config.sensors
     # Repetitions differ only by the noise of the sensors.
     noise = [{} if sensors.seed is None else {"sensors.seed": sensors.seed + number} for number in range(RAMPS)]

@@ -53,7 +53,7 @@ Signals = Mapping[str, Array]
 
 
 def loop(x: Array, y: Array) -> dict[str, float]:
-    """Return gradient and dead bands of a loop where it passes through zero, averaged over all periods."""
+    """Return gradient and dead bands of a loop at its zero crossings, averaged over all periods."""
     # The ordinate's dead band is the height of the loop at abscissa zero, positive if the ordinate lags behind the
     # abscissa; the abscissa's is the width at ordinate zero, with the same sign.
     up, down = (_crossings(x, y, sign) for sign in (1.0, -1.0))
@@ -69,7 +69,7 @@ def loop(x: Array, y: Array) -> dict[str, float]:
 
 
 def _crossings(x: Array, y: Array, sign: float) -> Array:
-    """Return the interpolated values of y where x passes through zero, upwards (1) or downwards (-1)."""
+    """Return the interpolated values of y at the zero crossings of x, upwards (1) or downwards (-1)."""
     places = np.flatnonzero((sign * x[:-1] < 0.0) & (sign * x[1:] >= 0.0))
     if places.size == 0:
         raise RecordingError("the signals form no loop: one of them does not pass through zero")
@@ -78,7 +78,7 @@ def _crossings(x: Array, y: Array, sign: float) -> Array:
 
 
 def slope(x: Array, y: Array) -> float:
-    """Return the slope of the line through points, or nan for fewer than three points."""
+    """Return the slope of the line through points, nan for fewer than three points."""
     return float(np.polynomial.Polynomial.fit(x, y, 1).convert().coef[1]) if len(x) > 2 else math.nan
 
 
@@ -161,7 +161,7 @@ def _through_centre(runs: list[StandardRun]) -> dict[str, Array]:
 
 
 def transition_lines(signals: Signals) -> list[dict[str, Any]]:
-    """Return the slopes of the car's response at the centre, and the lines of the hand torque outside of it."""
+    """Return the slopes of the car's response at the centre, and the hand torque lines outside the centre."""
     ay = signals["ay_mps2"]
     near = np.abs(ay) <= _CENTRE_MPS2
     found = []

@@ -30,7 +30,7 @@ Try = Callable[[str, Sequence[float]], list[bool]]
 
 
 def highest_clean(attempt: Try) -> float | None:
-    """Return the highest clean speed [km/h]: first from `COARSE_KMH`, then between it and the next coarse speed.
+    """Return the highest clean speed [km/h], from `COARSE_KMH` and then a finer search.
 
     It is None if the car is clean at no speed. The search does not go beyond the highest coarse speed.
     """
@@ -119,7 +119,7 @@ def _room(run: StandardRun) -> str:
 def _pictures(
     runner: StandardRunner, speeds: dict[str, float | None], driven: dict[str, list[StandardRun]]
 ) -> list[Picture]:
-    """Return figures of the best run to each side: its track between the cones, and its channels over time."""
+    """Return figures of the best run to each side: track between the cones, and channels over time."""
     best = {side: run for side, runs in driven.items() if (run := best_run(runs, speeds[side])) is not None}
     if not best:
         return []

@@ -1,4 +1,4 @@
-"""ISO 4138: steady-state circular driving behaviour, by its three methods."""
+"""ISO 4138: steady-state circular driving, by its three methods."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def examine(runner: StandardRunner) -> Findings:
 
 
 def _fixed_angle(runner: StandardRunner, car: CarGeometry) -> list[StandardRun]:
-    """Drive with the steering wheel at the Ackermann angle of the radius while the speed rises."""
+    """Drive with a fixed steering wheel angle, the Ackermann angle of the radius, and rising speed."""
     angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
     speed_mps = _START_KMH / 3.6
     maneuver: dict[str, Any] = {
@@ -126,6 +126,6 @@ def _picture(method: str, runs: dict[str, StandardRun]) -> Picture:
 
 
 def _smooth(values: Array) -> Array:
-    """Return the mean over half a second, for the figure."""
+    """Return the moving mean over half a second for the figure."""
     width = 25
     return np.convolve(values, np.full(width, 1.0 / width), mode="valid") if len(values) > width else values

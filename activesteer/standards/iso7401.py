@@ -1,4 +1,4 @@
-"""ISO 7401: lateral transient response, step input, continuous sinusoidal input, random input."""
+"""ISO 7401: lateral transient response to step, sinusoidal and random input."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def examine(runner: StandardRunner) -> Findings:
 
 
 def _sweep_responses(sweep: StandardRun) -> Responses:
-    """Return the frequency responses to the steering wheel angle, or empty if the sweep failed."""
+    """Return the frequency responses to the steering wheel angle, empty if the sweep failed."""
     frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, _POINTS)
     try:
         return {name: frequency_response(sweep, name, frequencies) for name in _RESPONSES}
@@ -130,7 +130,7 @@ def _sweep_responses(sweep: StandardRun) -> Responses:
 
 
 def _random_responses(runs: list[StandardRun]) -> Responses:
-    """Return the responses from the finished runs with random steering, empty if no run has finished."""
+    """Return the responses from the finished runs with random steering, empty without such a run."""
     driven = [run for run in runs if run.channels]
     if not driven:
         return {}
@@ -138,7 +138,7 @@ def _random_responses(runs: list[StandardRun]) -> Responses:
 
 
 def weak_ranges(found: FrequencyResponse) -> str:
-    """Return the frequency ranges with a coherence below `COHERENCE` as text, empty if there are none."""
+    """Describe the frequency ranges with a coherence below `COHERENCE`, empty without any."""
     weak = np.concatenate([[False], found.coherence < COHERENCE, [False]])
     edges = np.flatnonzero(np.diff(weak.astype(int)))
     lines = found.frequency_Hz

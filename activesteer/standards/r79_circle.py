@@ -32,7 +32,7 @@ from activesteer.studies.engine.workers import in_parallel
 
 
 class Effort(NamedTuple):
-    """A line of table 2 for cars (M1)."""
+    """A row of table 2 for cars (M1)."""
 
     radius_m: float  # radius to reach [m]
     limit_N: float  # greatest force at the rim until then [N]
@@ -63,14 +63,14 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Time from the start of steer to a radius, and largest force at the rim until then, or nan if not reached."""
+    """Return the time until a radius is reached and the largest rim force until then, nan if not reached."""
 
     time_s: float
     effort_N: float
 
 
 def reached(run: StandardRun, radius_m: float) -> Reached:
-    """Return the time from `_BEGIN_S` until a spiral reaches a path radius [m], and the largest rim force."""
+    """Return the time until a spiral reaches a path radius [m], and the largest rim force."""
     if not run.channels:
         return Reached(math.nan, math.nan)
     tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]
@@ -281,7 +281,7 @@ def usual_faults(controller: str) -> tuple[str, ...]:
 
 
 def circle(direction: str) -> dict[str, Any]:
-    """Return the manoeuvre: a path that bends smoothly into the circle, some seconds longer than the run."""
+    """Return the manoeuvre: a path that turns smoothly into the circle."""
     duration_s = _FAULT_S + _WINDOW_S
     times = (np.arange(math.ceil(SPEED_MPS * (duration_s + 4.0) / _SPACING_M)) + 0.5) * _SPACING_M / SPEED_MPS
     entry = 0.5 - 0.5 * np.cos(np.pi * np.minimum(times / _ENTRY_S, 1.0))
@@ -349,7 +349,7 @@ class _RecordingDriver:
 
 
 class _HandsFixed:
-    """Driver that replays the commands of the car without a fault."""
+    """Driver that repeats the commands of the car without a fault."""
 
     def __init__(self, commands: Sequence[DriverCommand]) -> None:
         self._next = iter(commands)
@@ -359,7 +359,7 @@ class _HandsFixed:
 
 
 class _FaultRuns:
-    """The runs in a circle, from one state shortly before the faults begin."""
+    """Runs in a circle, all from one state shortly before the faults begin."""
 
     def __init__(self, loop: ClosedLoop, lead_s: float, largest_offset_m: float) -> None:
         self.loop, self.largest_offset_m = loop, largest_offset_m
@@ -376,7 +376,7 @@ class _FaultRuns:
         return self.again(fault, _HandsFixed(self._commands))
 
     def again(self, fault: Fault, driver: Any = None) -> _Signals:
-        """Return the motion with a fault, with the driver of the loop unless another one is given."""
+        """Return the motion with a fault and a driver, by default the driver of the loop."""
         loop = self.loop
         loop.fail(())
         loop.restore_state(self._start)
@@ -396,7 +396,7 @@ class _FaultRuns:
 
 
 def _judged(runs: _FaultRuns, fault: Fault) -> dict[str, Any]:
-    """Return the values of a fault, or nan for an incomplete run."""
+    """Return the results of a fault, nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
         driven = runs.again(fault)
@@ -425,7 +425,7 @@ def _offset_m(runs: _FaultRuns, motion: _Signals) -> float:
 
 
 def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
-    """Return the time from the start of the fault until a limit is exceeded [s], or None if none is."""
+    """Return the time from the start of the fault to the first exceeded limit [s], or None."""
     good = runs.in_order
     broken = np.abs(motion.yaw_rate_radps - good.yaw_rate_radps) > YAW_RATE_RADPS
     broken |= np.abs(motion.ay_mps2 - good.ay_mps2) > AY_MPS2
@@ -435,7 +435,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the longest duration of a fault that keeps the limits, by bisection below `broken_s` [s].
+    """Find the longest duration of a fault that keeps the limits [s], by bisection.
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """

@@ -29,12 +29,12 @@ SIDES: Final = {"left": 1.0, "right": -1.0}
 
 
 class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test
-    """A car cannot be tested with a controller, because a prerequisite run failed."""
+    """Failure of a prerequisite run, without which a car cannot be tested."""
 
 
 @dataclass(frozen=True)
 class StandardRun:
-    """A finished run, which the analysis reads like a recording."""
+    """A finished run in the form of a recording for the analysis."""
 
     case: Mapping[str, Any]  # values in which it differs from the other runs of its series
     metrics: Mapping[str, float]  # its metrics; empty if it failed or could not be evaluated
@@ -43,7 +43,7 @@ class StandardRun:
 
     @property
     def time_s(self) -> Array:
-        """Time of the values of channels [s]."""
+        """Times of the samples [s]."""
         return np.asarray(CURVE_STEP_S * np.arange(len(next(iter(self.channels.values()), ()))), dtype=np.float64)
 
     @property
@@ -58,17 +58,17 @@ class StandardRun:
         return self.channels[channel]
 
     def at(self, channel: str, time_s: float) -> float:
-        """Return a channel at a time, interpolated, or nan after the end of the run."""
+        """Return the interpolated value of a channel at a time, nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
         return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
 
     @property
     def values(self) -> dict[str, Any]:
-        """Return case and metrics as JSON values, or the reason why there are no metrics."""
+        """Return case and metrics as JSON values, or the reason for missing metrics."""
         return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:
-        """Return a metric, or nan if the run does not have it."""
+        """Return a metric, nan if the run does not have it."""
         return self.metrics.get(name, math.nan)
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
@@ -154,12 +154,12 @@ class Findings:
 
     @property
     def error(self) -> str:
-        """Reason for a missing result, or empty with a result."""
+        """Reason for a missing result, empty otherwise."""
         return self.values.get("error", "")
 
     @property
     def passed(self) -> bool | None:
-        """True if the car keeps the limits, or None for a method without limits."""
+        """True if the car keeps the limits, None for a method without limits."""
         return self.values.get("pass")
 
 
@@ -193,7 +193,7 @@ def steering_wheel_at(runner: StandardRunner, speed_kmh: float, ay_mps2: float) 
 
 
 def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return a table of metrics with a column for each run, an empty cell for a missing metric."""
+    """Return a table of metrics (rows) and runs (columns), with empty cells for missing metrics."""
     names = list(dict.fromkeys(name for metrics in runs.values() for name in metrics))
     rows = [
         [shown.label, shown.unit.name, *(shown.text(metrics.get(shown.name, math.nan)) for metrics in runs.values())]
@@ -203,13 +203,13 @@ def metrics_table(title: str, runs: Mapping[str, Mapping[str, float]]) -> Table:
 
 
 def axis_label(name: str) -> str:
-    """Return label and unit of a channel, for an axis."""
+    """Return the axis label of a channel, with its unit."""
     shown = quantity_of(name)
     return f"{shown.label} [{shown.unit.name}]"
 
 
 def time_panels(runs: Mapping[str, StandardRun], channels: Sequence[str], begin_s: float, begin: str) -> list[Panel]:
-    """Return a panel for each channel of the runs, versus the time from an event described in words."""
+    """Return a panel of runs for each channel, versus the time from a described event."""
     return [
         Panel(
             f"time from {begin} [s]",

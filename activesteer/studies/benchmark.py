@@ -1,4 +1,4 @@
-"""Time of a step, of many cars and of a tyre, as `activesteer bench` measures it.
+"""Benchmarks of a step, of many cars and of a tyre, for `activesteer bench`.
 
 All times of a table come from one process, interleaved, so that their ratios are meaningful.
 """
@@ -118,7 +118,7 @@ def _engine(scenario: Scenario, *, forces: bool) -> float:
 
 
 class _KeptInputs:
-    """A run with the recorded inputs of the engine."""
+    """A run with stored inputs of the engine."""
 
     def __init__(self, scenario: Scenario) -> None:
         loop = ClosedLoop(scenario, _CONTROLLER)
@@ -130,7 +130,7 @@ class _KeptInputs:
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
-        """Return the engine's time per step of the same drive, without our Python code, in one native call [us]."""
+        """Return the engine's time per step when the stored inputs are replayed in one native call [us]."""
         self.vehicle.restore_state(self._start)
         return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
 
@@ -143,7 +143,7 @@ class _Nothing:
 
 
 def _closed_loop(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
-    """Return the time per step of a run, or of several together, each in a separate thread [us]."""
+    """Return the time per step of one run, or of several in separate threads [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]
 
@@ -177,7 +177,7 @@ def _step_steers(count: int) -> None:
 
 
 def _with_file(scenario: Scenario, path: Path) -> float:
-    """Return the time per step of a recorded run [us], without building, settling and opening the file."""
+    """Return the time per step of a recorded run [us], without setup."""
     simulation = Simulation(scenario, _CONTROLLER)
     start = 0.0
     with simulation.recorded_to(path):
@@ -187,7 +187,7 @@ def _with_file(scenario: Scenario, path: Path) -> float:
 
 
 def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure the cost of the tyres: one evaluation of the front tyre, and all four in the engine.
+    """Measure the cost of the tyres: one evaluation of a tyre, and all four tyres in the engine.
 
     `four_tyres_us` are the microseconds that four tyres with contact, relaxation and the application of their forces
     add to the engine's passive forces, in the same state.
@@ -219,7 +219,7 @@ _REAR_PER_YAW_RATE_S: Final = 0.05
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure batches of cars in the sine with dwell with ideal sensors, best of several interleaved rounds."""
+    """Measure batches of cars in the sine with dwell, best of several interleaved rounds."""
     found: dict[str, float] = {}
     for size in SIZES:
         before, threads = _memory_MB(), os.cpu_count() or 1
@@ -259,7 +259,7 @@ def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
 
 
 def _memory_MB() -> float:
-    """Return the memory that this process holds [MB], or 0 where the system does not report it."""
+    """Return the memory of this process [MB], 0 if unknown."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

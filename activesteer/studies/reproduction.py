@@ -1,4 +1,4 @@
-"""Reproduction of the paper: five scenarios with three steering systems, recorded, and its claims checked.
+"""Reproduction of the paper: five scenarios with three systems, and the check of its claims.
 
 Runs are independent, so they are distributed over processes. Each process writes its own file, and the scorecard is
 made from the files.
@@ -50,11 +50,11 @@ class Reproduction:
 
     @property
     def exit_status(self) -> int:
-        """Exit status: 0 if all runs are complete and each claim passed or is listed as not reproduced, else 1."""
+        """Exit status: 0 if all runs are complete and no claim fails unexpectedly, else 1."""
         return 1 if self.failures else self.scorecard.exit_status
 
     def recordings(self) -> dict[str, dict[str, Recording]]:
-        """Return the complete runs, opened, by scenario and system."""
+        """Return the recordings of the complete runs, by scenario and system."""
         return {
             scenario: {system: Recording.open(path) for system, path in systems.items()}
             for scenario, systems in self.paths.items()
@@ -103,7 +103,7 @@ def reproduce(
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[tuple[str, str, str]]:
-    """Drive all runs, and report each of them when it ends.
+    """Drive all runs, and report each run at its end.
 
     Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
 
@@ -126,7 +126,7 @@ def drive(
 
 
 def _run(scenario: Scenario, system: str, path: Path) -> str:
-    """Drive one run in a separate process, and return the problem."""
+    """Drive one run in a separate process, and return its error."""
     try:
         run_scenario(scenario, system, path=path)
     except ActiveSteerError as error:
@@ -135,7 +135,7 @@ def _run(scenario: Scenario, system: str, path: Path) -> str:
 
 
 def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
-    """Write a page with all runs, including those that ended early, or return None if no run made a step."""
+    """Write a page with all runs, including incomplete ones, and return its path."""
     recordings: dict[str, Recording] = {}
     for result in results:
         for scenario, systems in result.paths.items():
@@ -149,7 +149,7 @@ def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
 
 
 def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """Draw all figures that these runs allow, and the figure of the suspension: PNG, SVG and PDF."""
+    """Draw all figures for which runs are complete, and the figure of the suspension."""
     files = draw_runs(recordings, folder)
     camber = rear_camber_figure(kinematics_compliance(vehicle))
     files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]
@@ -161,7 +161,7 @@ def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehi
 
 
 def models_beside(run: Recording) -> dict[str, dict[str, Array]]:
-    """Return responses of linear models to the steering of a run: single track and, on a level road, the full car."""
+    """Return the responses of linear models to the steering of a run: single track and full car."""
     maneuver, vehicle = run.metadata["maneuver"], run.metadata["vehicle"]
     single_track = SingleTrackParameters(**vehicle["single_track"])
     models = {"single-track model": single_track_response(run, single_track, vehicle["steering"]["ratio"])}

@@ -1,4 +1,4 @@
-"""Formulas that need no multibody car, shared by controllers, driver, figures and identification.
+"""Formulas that need no multibody car, for controllers, driver, figures and identification.
 
 In: parameters of simple models.
 Out: steady states and responses, as formulas.

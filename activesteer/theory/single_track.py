@@ -1,4 +1,4 @@
-"""The linear single-track model: its equations, its steady state, and the rear angle that it predicts.
+"""The linear single-track model: equations, steady state, and prediction of the rear angle.
 
 Also the parameters that a two-track model needs beyond those of the single-track model.
 
@@ -109,7 +109,7 @@ class SingleTrack(NativeBlock):
     _yaw_inertia_kgm2: float
 
     def __init__(self, parameters: SingleTrackParameters) -> None:
-        """Compute everything that does not depend on speed.
+        """Compute all values that do not depend on speed.
 
         Args:
             parameters: The parameters of the car.
@@ -192,7 +192,7 @@ class SingleTrack(NativeBlock):
         )
 
     def matrices(self, speed_mps: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return system and input matrix of eqs. 1 and 2 for yaw rate and sideslip angle, shape (2, 2) each."""
+        """Return the system and input matrices of eqs. 1 and 2 for yaw rate and sideslip angle."""
         p, v = self.parameters, speed_mps
         cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
         m, jz = p.mass_kg, p.yaw_inertia_kgm2
@@ -209,14 +209,14 @@ class SingleTrack(NativeBlock):
 
 @shared
 def yaw_rate_gain(model: SingleTrack, speed_mps: float) -> float:
-    """Return `SingleTrack.yaw_rate_gain`, also in compiled code."""
+    """Compiled form of `SingleTrack.yaw_rate_gain`."""
     ratio = speed_mps / model.characteristic_speed_mps
     return speed_mps / model.wheelbase_m / (1.0 + ratio * ratio)
 
 
 @shared
 def rear_prediction(model: SingleTrack, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
-    """Return `SingleTrack.rear_prediction`, also in compiled code."""
+    """Compiled form of `SingleTrack.rear_prediction`."""
     # Called in every step of a run; everything that does not depend on speed is computed beforehand.
     square = speed_mps * speed_mps
     denominator = model._rear_moment_kgm * square + model._front_moment_Nm

@@ -1,10 +1,10 @@
-"""The tolerance function: the activity of a corrector over the error."""
+"""The tolerance function: activity of a corrector versus the error."""
 
 from __future__ import annotations
 
 
 def tolerance(error_radps: float, deadband_start_radps: float, deadband_end_radps: float) -> float:
-    """Return the activity of a corrector: 0 inside the dead band, 1 from its end, a smooth cubic between (Fig. 9).
+    """Return the activity of a corrector: 0 inside the dead band, then a smooth cubic up to 1 (Fig. 9).
 
     Args:
         error_radps: Yaw rate error, either sign [rad/s].

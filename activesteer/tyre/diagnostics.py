@@ -1,4 +1,4 @@
-"""Remarks on unusual values of a tyre, each with its reason."""
+"""Remarks on unusual values of a tyre, with reasons."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _SECTIONS: Final = {
 
 
 def remarks(params: TyreParameters) -> list[tuple[str, str]]:
-    """Return the unusual properties of a tyre, each with its reason or consequence, or empty for an ordinary tyre."""
+    """Return remarks on the unusual properties of a tyre, empty for an ordinary tyre."""
     parts = (_missing, _scales, _frame, _ranges, _levels, _curvatures, _asymmetry)
     return [remark for part in parts for remark in part(params)]
 

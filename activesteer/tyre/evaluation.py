@@ -24,7 +24,7 @@ _MF52 = 52
 
 
 class _Column:
-    """Descriptor of a column of `TyreForces`, by the name of the attribute, in the shape of the inputs."""
+    """Descriptor of a column of `TyreForces`, in the shape of the inputs."""
 
     def __init__(self, table: str, columns: tuple[str, ...]) -> None:
         self._table, self._columns = table, columns
@@ -106,7 +106,7 @@ class TyreForces:
 
     @property
     def limits(self) -> NDArray[np.int64]:
-        """Inputs evaluated at their limit: sums of `Limit` values."""
+        """Flags of inputs that were evaluated at their limit: sums of `Limit` values."""
         return self._flags.reshape(self.shape)
 
     def saturated(self, limit: Limit) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Report on a tyre: key figures, remarks, and the time of an evaluation."""
+"""Report on a tyre: key figures, remarks, and evaluation time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _LOADS: Final = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
 
 
 def _within(params: TyreParameters, low: str, high: str, widest: float, count: int = 801) -> np.ndarray:
-    """Return even values within a range of the file, and not beyond `widest`."""
+    """Return evenly spaced values within a range of the file, limited to `widest`."""
     return np.linspace(max(params[low], -widest), min(params[high], widest), count)
 
 
@@ -37,7 +37,7 @@ def _nominal(params: TyreParameters) -> float:
 
 
 def key_figures(params: TyreParameters) -> dict[str, Any]:
-    """Return numbers that characterise a tyre, for a table or as JSON."""
+    """Return key figures of a tyre."""
     nominal = params["FNOMIN"]
     loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
@@ -94,7 +94,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """Return the size in words, such as 205/55 R16, or None if the file has no dimensions."""
+    """Return the size designation, such as 205/55 R16, None without dimensions in the file."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M
@@ -122,7 +122,7 @@ _TABLE: Final = (
 
 
 def describe(params: TyreParameters) -> str:
-    """Describe a tyre and its unusual properties as text for a terminal."""
+    """Describe a tyre and its unusual properties for a terminal."""
     figures = key_figures(params)
     ranges = figures["ranges"]
     name = params.source.name if params.source else "tyre"
@@ -205,7 +205,7 @@ def _loads(params: TyreParameters) -> list[float]:
 
 
 def _side_force(formula: MagicFormula) -> Picture:
-    """Draw side force above, aligning moment below, for several loads on the left and cambers on the right."""
+    """Draw side force (above) and aligning moment (below) for several loads (left) and cambers (right)."""
     params, nominal = formula.parameters, _nominal(formula.parameters)
     alpha = _within(params, "ALPMIN", "ALPMAX", _WIDEST_ANGLE_RAD)
     cambers = np.unique(
@@ -242,7 +242,7 @@ def _longitudinal_force(formula: MagicFormula) -> Picture:
 
 
 def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the greatest horizontal force of a tyre in every direction."""
+    """Return the greatest horizontal force of a tyre in each direction."""
     params = formula.parameters
     # Closer together near zero, where the forces change fastest.
     fraction = np.linspace(-1.0, 1.0, _GRID)
@@ -321,7 +321,7 @@ _ROUNDS: Final = 5
 
 @compiled
 def _scalar_calls(tyre, count, pressure_Pa):
-    """Return the sum of all five outputs of `count` scalar calls with different inputs."""
+    """Evaluate a tyre `count` times with different inputs, and return the sum of all outputs."""
     p, total = tyre[0], 0.0
     for index in range(count):
         # Small changes, so that the compiler cannot omit a call or move it out of the loop.
@@ -334,7 +334,7 @@ def _scalar_calls(tyre, count, pressure_Pa):
 
 
 def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measure the full evaluation (combined slip with camber, all five outputs) on one core."""
+    """Measure the time of the full evaluation on one core."""
     record, pressure = np.atleast_1d(params.record), params["INFLPRES"]
     rng = np.random.default_rng(0)
     rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]

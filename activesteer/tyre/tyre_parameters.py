@@ -1,4 +1,4 @@
-"""Parameters of a tyre and its conventions, and a check that its forces are finite over its ranges.
+"""Parameters of a tyre, their conventions, and a check that the forces are finite.
 
 A .tir file holds coefficients, not a program. The defaults are the conventions of this package. The alternatives are
 those of other codes, so that a car can be compared with one of theirs, force by force.
@@ -34,7 +34,7 @@ from activesteer.tyre.kernels.magic_formula import (
 
 @dataclass(frozen=True)
 class TyreConventions:
-    """Evaluation of a tyre's coefficients, as the table [tyres.conventions] of a vehicle file."""
+    """Conventions for a tyre's coefficients, as the table [tyres.conventions] of a vehicle file."""
 
     camber: bool = True
     """Whether camber enters the formula. Without it, camber still acts by geometry: contact point and direction of
@@ -63,7 +63,7 @@ class TyreConventions:
     """Friction of the road to which the file's peaks belong. The road's friction is divided by it [-]."""
 
     def numbers(self) -> dict[str, float]:
-        """Numbers for the kernels, by field of the tyre's record."""
+        """Numbers of a tyre for the kernels, by field of its record."""
         return {
             "CAMBER_OFF": float(not self.camber),
             "RELAXATION_OFF": float(not self.relaxation),
@@ -102,12 +102,12 @@ TYRE_RECORD: Final = numbers_type(*_FIELDS)
 
 
 def is_finite(tyre: np.record) -> bool:
-    """Return True if forces, radii and relaxation lengths are finite over the tyre's ranges, rolling and at rest."""
+    """Return whether forces, radii and relaxation lengths are finite over the tyre's ranges."""
     return _is_finite(np.atleast_1d(tyre).tobytes())
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """Return the enormous coefficient with a default that gives a finite tyre, or the largest of several."""
+    """Return the enormous coefficient whose default makes the tyre finite, or None."""
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
         tried = np.atleast_1d(tyre).copy()
@@ -142,7 +142,7 @@ def _on_road(tyre, deflection_m, camber_rad, speed_mps, slip, across_mps, closin
 
 
 def _motions(p: np.record) -> Iterator[tuple[float, ...]]:
-    """Yield wheels that stand, roll, slide and fall, pressed down by a little and by a third of the tyre's height."""
+    """Yield states of wheels that stand, roll, slide and fall, under a small and a large deflection."""
     height = p.UNLOADED_RADIUS - p.RIM_RADIUS
     return product(
         (0.02 * height, 0.3 * height),
@@ -155,7 +155,7 @@ def _motions(p: np.record) -> Iterator[tuple[float, ...]]:
 
 
 def _operating_points(p: np.record) -> np.ndarray:
-    """Return corners, middle and points between of the ranges of a tyre file, shape (n, len(INPUT_COLUMNS))."""
+    """Return corners, centre and intermediate points of the ranges of a tyre file."""
     loads = {max(p.FZMIN, 0.01 * p.FZMAX), min(max(p.FNOMIN, p.FZMIN), p.FZMAX), p.FZMAX}
     slips, angles = (
         (low, 0.1 * low, 0.0, 0.1 * high, high) for low, high in ((p.KPUMIN, p.KPUMAX), (p.ALPMIN, p.ALPMAX))
@@ -215,7 +215,7 @@ class TyreParameters(Mapping[str, float]):
     conventions: TyreConventions = TyreConventions()
 
     def __post_init__(self) -> None:
-        """Check the values and derive those that the file does not give."""
+        """Check the values, and derive missing ones."""
         source = str(self.source or "tyre")
         values = _resolve(self.given, source)
         object.__setattr__(self, "_values", MappingProxyType(values))
@@ -243,7 +243,7 @@ class TyreParameters(Mapping[str, float]):
 
     @property
     def record(self) -> np.record:
-        """Record for the kernels, a new `TYRE_RECORD` at every call."""
+        """Return a new `TYRE_RECORD` for the kernels."""
         record = np.zeros(1, TYRE_RECORD)[0]
         for coefficient in COEFFICIENTS:
             record[coefficient.name] = self[coefficient.name]
@@ -261,7 +261,7 @@ class TyreParameters(Mapping[str, float]):
         return record
 
     def mounted_on(self, side: Side) -> TyreParameters:
-        """Return the same tyre on a side of the vehicle, mirrored if its coefficients belong to the other side."""
+        """Return the tyre for a side of the vehicle, mirrored if its coefficients belong to the other side."""
         if side not in ("LEFT", "RIGHT"):
             raise ParameterError(f"is {side!r}; allowed are 'LEFT' and 'RIGHT'", key="side", value=side)
         return replace(self, mounted=side)
@@ -275,7 +275,7 @@ class TyreParameters(Mapping[str, float]):
         return replace(self, given={**self.given, **changes})
 
     def __getitem__(self, key: str) -> float:
-        """Return the value of a key in SI, or its default if the file does not give it."""
+        """Return the value of a key in SI, from the file or by default."""
         values: Mapping[str, float] = self.__dict__["_values"]
         try:
             return values[key]
@@ -293,12 +293,12 @@ class TyreParameters(Mapping[str, float]):
         return len(BY_NAME)
 
     def __contains__(self, key: object) -> bool:
-        """Return True if the key exists, given in the file or not."""
+        """Return whether the key exists."""
         return key in BY_NAME
 
 
 def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
-    """Return every coefficient: the given value, the default, or the quantity that replaces it."""
+    """Return every coefficient as given, by default, or from the quantity that replaces it."""
 
     def fail(key: str, value: float, problem: str) -> ParameterError:
         return ParameterError(f"is {value:g}; {problem}", file=source, key=key, value=value)

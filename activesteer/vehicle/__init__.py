@@ -1,4 +1,4 @@
-"""The car in MuJoCo: MJCF and parameters in, commands in, measurements and raw rows out.
+"""The car in MuJoCo: it turns MJCF, parameters and commands into measurements and raw rows.
 
 In: MJCF, a vehicle file, the driver's and controller's commands.
 Out: measurements, raw rows of channels, and states that can be restored.

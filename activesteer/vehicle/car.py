@@ -1,4 +1,4 @@
-"""The car in the engine: commands in, one step, measurements out."""
+"""The car in the engine: commands, steps and measurements."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Vehicle(Uncopyable):
         timestep_s: float = DEFAULT_TIMESTEP_S,
         content: Mapping[str, bytes] | None = None,
     ) -> None:
-        """Compile the car, put it into static equilibrium and install the native forces.
+        """Compile the car, move it into static equilibrium and install the native forces.
 
         Args:
             mjcf: The model file.
@@ -129,7 +129,7 @@ class Vehicle(Uncopyable):
             raise ModelError(str(reason), file=str(mjcf), value=reason.value, allowed=reason.allowed) from reason
 
     def _bind(self) -> None:
-        """Look up all addresses, so that the step uses nothing but integers and views."""
+        """Look up all addresses once, so that a step needs only integers and views."""
         model, data = self.model, self.data
         root = model.joint(find(model, mujoco.mjtObj.mjOBJ_JOINT, "root"))
         if root.qposadr[0] or root.dofadr[0]:
@@ -156,7 +156,7 @@ class Vehicle(Uncopyable):
         self._faults: NDArray[Any] | None = None
 
     def _place(self) -> None:
-        """Put the car into static equilibrium at the origin of the world, heading along x."""
+        """Move the car into static equilibrium at the origin of the world, heading along x."""
         mujoco.mj_resetData(self.model, self.data)
         plays = [link["backlash_m"] for link, _ in self.actuators.rear_screws()]
         originals = [play.copy() for play in plays]
@@ -167,7 +167,7 @@ class Vehicle(Uncopyable):
             play[:] = value
 
     def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
-        """Set the car rolling straight ahead at a speed, from static ride.
+        """Start the car from static ride, rolling straight ahead at a speed.
 
         Args:
             speed_mps: Speed along world x [m/s].
@@ -198,7 +198,7 @@ class Vehicle(Uncopyable):
         return sum(part * height for part, height in zip(fractions, self.wheels.heights_m().tolist(), strict=True))
 
     def rebase(self) -> None:
-        """Make the current position and heading the origin of the road, and the current time the origin of time.
+        """Set the current position and heading as the origin of the road, and the current time as time 0.
 
         The motion continues unchanged. From here on the friction of the road's areas counts; before, the road's `mu`.
         """
@@ -218,7 +218,7 @@ class Vehicle(Uncopyable):
         drop_metric(self.model, data)
 
     def step(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> tuple[Measurement, Motion]:
-        """Apply the commands and advance the engine by one step, which is recorded on the tape (see `record_on`).
+        """Apply the commands, advance the engine by one step, and record the step (see `record_on`).
 
         Args:
             driver_command: Command of the driver.
@@ -262,11 +262,11 @@ class Vehicle(Uncopyable):
 
     @property
     def gear(self) -> float:
-        """Gear that the car is in."""
+        """Current gear of the car."""
         return float(self._forces["gear"][0])
 
     def replay(self, inputs: NDArray[np.float64]) -> None:
-        """Advance only the engine by several steps in one native call, without commands, checks or recording.
+        """Advance only the engine by several steps, without commands, checks or recording.
 
         Args:
             inputs: Inputs of all actuators in each step, as a run left them in `data.ctrl`; shape (steps, actuators).
@@ -287,12 +287,12 @@ class Vehicle(Uncopyable):
         native_step.replay(self._address, inputs)
 
     def follow_model(self) -> None:
-        """Apply changes of `model` that a plan of the step froze (see `ImplicitPlan.follow`)."""
+        """Apply changes of `model` to the plan of the step (see `ImplicitPlan.follow`)."""
         self._implicit.follow()
 
     @property
     def rack_per_steering_wheel_m(self) -> float | None:
-        """Rack travel per steering wheel angle [m/rad], from the tendon `steering_column`, or None without one."""
+        """Rack travel per steering wheel angle [m/rad], or None without a steering column."""
         arms = tendon_arms(self.model, "steering_column")
         if "rack" not in arms or "steering_wheel" not in arms:
             return None
@@ -300,7 +300,7 @@ class Vehicle(Uncopyable):
 
     @property
     def steering_lag_s(self) -> float:
-        """Lag of the recorded steering wheel angle behind a demand that grows steadily [s].
+        """Lag of the recorded steering wheel angle behind a steadily growing demand [s].
 
         The lag is one step plus damping over stiffness of the hands.
         """
@@ -330,7 +330,7 @@ class Vehicle(Uncopyable):
         return self.truth()[1]
 
     def truth(self) -> tuple[Measurement, Motion]:
-        """Return the signals of ideal sensors, and `motion`."""
+        """Return the signals of ideal sensors, and the motion of the car."""
         if not native_step.sense(self._address, *self._sensed_at):
             self.check()
         return self._said()
@@ -340,7 +340,7 @@ class Vehicle(Uncopyable):
         return new_message(Measurement, measurement), new_message(Motion, motion)
 
     def check(self) -> None:
-        """Check for warnings of the engine and for values that are not finite, commands first.
+        """Check for warnings of the engine and for values that are not finite.
 
         Raises:
             SimulationDiverged: there is a warning or such a value, or a wheel has left the known surface of a road
@@ -372,7 +372,7 @@ class Vehicle(Uncopyable):
         self.channels.add_estimate()
 
     def note_estimate(self, estimate: Estimate) -> None:
-        """Record an estimate from the next step on, if estimates are recorded (see `record_estimate`)."""
+        """Set the estimate to record from the next step on (see `record_estimate`)."""
         if self._estimate_memory is not None:
             _write_estimate(self._estimate_memory, estimate)
 
@@ -400,12 +400,12 @@ class Vehicle(Uncopyable):
         native_step.engage(self._address, float(state[-1]))
 
     def _memory(self) -> list[NDArray[np.float64]]:
-        """Memory apart from the engine's state: brakes, motors, sensors, estimate, the engine's current sensor data."""
+        """Memory outside the engine: brakes, motors, sensors, estimate and current sensor data."""
         sensors = [] if self.sensors is None else [self.sensors.memory]
         return [self._brake_row, self.electric.state, self.data.sensordata, self.rows.estimate, *sensors]
 
     def native_parts(self) -> dict[str, NDArray[Any]]:
-        """Return the memory of the native step apart from the engine's, by name, as views.
+        """Return views of the native memory outside the engine, by name.
 
         An address in one of these records points into one of these arrays, into an array or a struct of the engine, or
         to a function of the engine.
@@ -425,7 +425,7 @@ class Vehicle(Uncopyable):
         }
 
     def adopt_model(self, model: mujoco.MjModel) -> None:
-        """Take over all numbers of another model of the same car, such as a mass changed at run time.
+        """Copy all numbers of another model of the same car, such as a mass changed at run time.
 
         Raises:
             ParameterError: `model` belongs to another car.
@@ -449,14 +449,14 @@ class Vehicle(Uncopyable):
             record[...] = np.array(area, fb.AREA)
 
     def limit_hands(self, torque_Nm: float | None) -> None:
-        """Limit the torque of the hands on the steering wheel [N m]. None removes the limit."""
+        """Limit the torque of the hands on the steering wheel [N m], or remove the limit with None."""
         hands, felt = self._hands, 1.0 - self.parameters.steering.assist_fraction
         self.model.actuator_forcelimited[hands] = torque_Nm is not None
         maximum = 0.0 if torque_Nm is None else torque_Nm / felt
         self.model.actuator_forcerange[hands] = -maximum, maximum
 
     def put_sensors_between(self, *, wanted: bool) -> None:
-        """Insert ideal sensors that can fail between the truth and the brakes, or remove them.
+        """Insert fault-capable ideal sensors between the true motion and the brakes, or remove them.
 
         Args:
             wanted: Whether to insert the sensors; no effect on a car with sensors of its own.
@@ -468,17 +468,17 @@ class Vehicle(Uncopyable):
                 self.sensors.reset(self.truth()[0])
 
     def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
-        """Let these records of `faults.FAULT` act in every step, or None for no faults."""
+        """Apply records of `faults.FAULT` in every step, or None without faults."""
         acting = None if faults is None or not faults.size else faults
         self._faults, self._bindings["n_faults"] = acting, 0 if acting is None else acting.size
         self._bindings["faults"] = 0 if acting is None else acting.ctypes.data
 
     def note_faults(self, count: int) -> None:
-        """Record this number of active faults from now on."""
+        """Set the number of active faults to record from now on."""
         self.data.userdata[-1] = count
 
     def dimensions(self) -> dict[str, float | list[float]]:
-        """Return width, wheelbase, tracks and tyre widths in the design position [m], for evaluations."""
+        """Return the dimensions of the car in the design position [m]."""
         at_rest = mujoco.MjData(self.model)
         mujoco.mj_kinematics(self.model, at_rest)
         fl, fr, rl, rr = (at_rest.xpos[self.model.body(f"{corner}_wheel").id] for corner in CORNERS)
@@ -504,7 +504,7 @@ def _write_estimate(memory: memoryview, estimate: Estimate) -> None:
 
 
 def _raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Array, speed_mps: float) -> None:
-    """Look for warnings of the engine and for values that are not finite, commands first."""
+    """Raise `SimulationDiverged` if the engine warns or a value is not finite."""
     for name in CARRIED_OUT:
         value = commands[COMMANDS.index(name)]
         if not math.isfinite(value):
@@ -527,7 +527,7 @@ def _raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Arr
 
 
 def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:
-    """Names of the numbers of a model, or of its options, that can change at run time."""
+    """Names of the numbers that can change at run time in a model, or in its options."""
     kinds = (np.ndarray, int, float) if isinstance(part, mujoco.MjOption) else (np.ndarray,)
     return [name for name in dir(part) if not name.startswith("_") and isinstance(getattr(part, name), kinds)]
 

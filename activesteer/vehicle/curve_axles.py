@@ -1,4 +1,4 @@
-"""An axle guided by measured curves of kinematics and compliance, and its forces in compiled code.
+"""Axles guided by measured curves of kinematics and compliance, and their forces in compiled code.
 
 The wheel centre's height is free. Its other five coordinates (forwards, outwards, camber, caster, toe) follow curves
 over the height and, at a steered axle, over the rack. Forces deflect the wheel from the curves against a 5 x 5
@@ -50,7 +50,7 @@ _ENTRIES: Final = 15
 
 @dataclass(frozen=True)
 class AxleCurves:
-    """The curves of one axle: left wheel, cubic splines through the points, straight beyond their ends."""
+    """Curves of the left wheel of an axle: cubic splines, straight beyond their ends."""
 
     travel_m: tuple[float, ...]
     """Height of the wheel centre above the design position, positive in bump, increasing [m]."""
@@ -91,7 +91,7 @@ class AxleCurves:
     """Rotation of the left knuckle in side view [rad]."""
 
     def __post_init__(self) -> None:
-        """Check lengths, order, and that the stiffness holds the wheel."""
+        """Check lengths and order of the curves, and that the stiffness is positive definite."""
         _check_curves(self, "travel_m", (*OVER_TRAVEL, "load_N"))
         if self.is_steered or any(getattr(self, name) for name in OVER_RACK):
             _check_curves(self, "rack_m", OVER_RACK)
@@ -201,7 +201,7 @@ def fit_curve_axles(spec: mujoco.MjSpec, curves: Curves) -> None:
 
 
 def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDArray[Any]], list[NDArray[np.float64]]]:
-    """Return the records of all wheels of curve axles, and the tables of their curves."""
+    """Return the records of the wheels of curve axles, and the tables of their curves."""
     records: list[NDArray[Any]] = []
     tables: list[NDArray[np.float64]] = []
     places: dict[str, tuple[int, int]] = {}
@@ -219,7 +219,7 @@ def curve_axle_records(model: mujoco.MjModel, curves: Curves) -> tuple[list[NDAr
 
 
 def _joints_of_model(model: mujoco.MjModel, corner: str) -> tuple[int, int]:
-    """Return the addresses of a corner's first coordinate and velocity, which the others follow."""
+    """Return the addresses of a corner's first coordinate and first velocity. The others follow in order."""
     joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, f"{corner}_{name}") for name in JOINTS]
     qpos, dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     if (np.diff(qpos) != 1).any() or (np.diff(dofs) != 1).any():
@@ -233,7 +233,7 @@ def _side(corner: str) -> float:
 
 
 def _mirror(side: float) -> NDArray[np.float64]:
-    """Return the signs that turn the coordinates of a wheel into coordinates of the left one."""
+    """Return the signs that convert the coordinates of a wheel to a left wheel."""
     return np.array([1.0, side, side, 1.0, side])
 
 
@@ -244,14 +244,14 @@ def _spline(points: tuple[float, ...], values: NDArray[np.float64]) -> CubicSpli
 
 
 def _slopes(axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the slopes of the five curves in the design position, versus travel and rack."""
+    """Return the slopes of the curves in the design position, versus travel and rack."""
     by_travel = _spline(axle.travel_m, axle.over_travel())(0.0, 1)[: len(COORDINATES)]
     by_rack = _spline(axle.rack_m, axle.over_rack())(0.0, 1) if axle.is_steered else np.zeros(len(COORDINATES))
     return by_travel, by_rack
 
 
 def _table(points: tuple[float, ...], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lay a spline through the points and return it on even intervals, as cubics of the place in each interval."""
+    """Resample a spline through points to cubics on even intervals."""
     if not points:
         return np.zeros(0)
     spline = _spline(points, values)
@@ -307,12 +307,12 @@ def _record(model: mujoco.MjModel, corner: str, axle: AxleCurves, tables: tuple[
 
 
 def _damping(axle: AxleCurves, square: float) -> float:
-    """Return the damping of a mode of unit inertia with a given square of its frequency [1/s, 1/s2]."""
+    """Return the damping of a mode from the square of its frequency, for unit inertia."""
     return 2.0 * axle.damping_ratio * float(np.sqrt(square))
 
 
 def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
-    """Return the inverse of the inertia of all degrees of freedom in the design position, shape (nv, nv)."""
+    """Return the inverse mass matrix of all degrees of freedom in the design position, shape (nv, nv)."""
     data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, full)
@@ -320,7 +320,7 @@ def _mobility(model: mujoco.MjModel) -> NDArray[np.float64]:
 
 
 def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np.float64]:
-    """Return the deflections from the curves, mirrored to the left wheel, per degree of freedom, shape (5, nv)."""
+    """Return the deflections from the curves per degree of freedom, as for a left wheel, shape (5, nv)."""
     rows, side = np.zeros((len(COORDINATES), model.nv)), _side(corner)
     _, first = _joints_of_model(model, corner)
     by_travel, by_rack = _slopes(axle)
@@ -332,7 +332,7 @@ def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np
 
 
 def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the squared frequencies of a knuckle on the stiffness about the curves, and the deflection of each mode.
+    """Return the modes of a knuckle on its stiffness: squared frequencies and deflections.
 
     The inertia is that of a fast motion of the five coordinates with the rest free to move. A wheel that turns on its
     bearing takes no part in the rotation of its knuckle in side view.
@@ -355,7 +355,7 @@ _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 @inlined
 def _place(table, position):
-    """Return the interval, the place in it from 0 to 1, and the distance beyond the ends, in intervals."""
+    """Return index, fraction and overshoot of a position on a spline, in intervals."""
     at = (position - table.start_m) * table.per_m
     count = table.intervals
     inside = min(max(at, 0.0), count)
@@ -375,7 +375,7 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Return a coordinate's deflection from the curves (as a left wheel), its rate, and the curves' slopes.
+    """Return a coordinate's deflection from its curves as for a left wheel, its rate, and the slopes of the curves.
 
     Then follow deflection and rate as the engine's tendons have them, with straight curves.
     """

@@ -1,4 +1,4 @@
-"""Electric motors in a vehicle file: on wheels or axles with their battery, and with gears, rear and superposition.
+"""Electric motors of a vehicle file: drive motors with their battery, and motors of steering actuators.
 
 An actuator is a servo of the model, or a motor with a gear.
 The gear adds its angle between steering wheel and rack, so all three carry the same torque: the hands must hold the
@@ -35,7 +35,7 @@ _Fraction = Annotated[float, Range(0.0, 1.0)]
 
 @dataclass(frozen=True)
 class Motor:
-    """A motor with inverter and gear, on one wheel or, through a differential, on both wheels of an axle."""
+    """A motor with inverter and gear, which drives one wheel or both wheels of an axle."""
 
     speed_radps: tuple[float, ...]
     """Speeds of the torque-speed map at the motor's shaft, from 0, increasing [rad/s]. Above the last one there is no
@@ -83,7 +83,7 @@ class Motor:
 
     @property
     def wheel_torque_Nm(self) -> float:
-        """Largest torque at the wheels that it drives, together [N m]."""
+        """Largest total torque at the driven wheels [N m]."""
         return self.gear_ratio * max(self.torque_Nm)
 
     @property
@@ -101,7 +101,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class Motors:
-    """Electric motors by their places, one on an axle or one on each wheel, by default none."""
+    """Drive motors by position, one per axle or one per wheel, none by default."""
 
     front: Motor | None = None
     """Motor of the front axle, with a differential."""
@@ -117,7 +117,7 @@ class Motors:
     """Motor of the rear right wheel."""
 
     def __post_init__(self) -> None:
-        """Check that each axle has one motor or a pair, and that only an axle has a differential."""
+        """Check that each axle has one motor or a pair, and that a differential belongs to a single motor."""
         for axle, wheels in AXLES.items():
             pair = [name for name in wheels if getattr(self, name) is not None]
             if pair and getattr(self, axle) is not None:
@@ -137,7 +137,7 @@ class Motors:
                     )
 
     def __iter__(self) -> Iterator[tuple[str, Motor]]:
-        """Return the places that have a motor, each with its motor."""
+        """Return the drive motors by position."""
         return iter([(item.name, motor) for item in fields(self) if (motor := getattr(self, item.name)) is not None])
 
     def on(self, axle: str) -> list[Motor]:
@@ -145,11 +145,11 @@ class Motors:
         return [motor for name, motor in self if name == axle or name in AXLES[axle]]
 
     def at(self, corner: str) -> tuple[str, Motor] | None:
-        """Return place and motor that drive a wheel, or None."""
+        """Return position and motor of the drive of a wheel, None without a motor."""
         return next(((name, motor) for name, motor in self if name == corner or corner in AXLES.get(name, ())), None)
 
     def inertia_kgm2(self, corner: str) -> float:
-        """Return the inertia of a motor at a wheel, half of it behind a differential [kg m2]."""
+        """Return the rotor inertia at a wheel [kg m2]."""
         found = self.at(corner)
         if found is None:
             return 0.0
@@ -157,7 +157,7 @@ class Motors:
         return motor.rotor_inertia_kgm2 * motor.gear_ratio**2 * (0.5 if place in AXLES else 1.0)
 
     def splits(self, axle: str) -> bool:
-        """Return True if the torques of an axle's wheels can differ."""
+        """Return whether the torques of an axle's wheels can differ."""
         motors = self.on(axle)
         return len(motors) == 2 or (len(motors) == 1 and motors[0].differential == "splitting")
 
@@ -170,7 +170,7 @@ PLACES: Final = tuple(item.name for item in fields(Motors))
 
 @dataclass(frozen=True)
 class Battery:
-    """The battery of the motors: limits of its power at the terminals."""
+    """Battery of the motors, with the limits of its power at the terminals."""
 
     discharge_power_W: _Positive | None = None
     """Largest power that it gives [W]. Default no limit."""
@@ -208,7 +208,7 @@ _UNLIMITED: Final = 1e12
 
 
 def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
-    """Return the records of a car's motors, in the order of their places."""
+    """Return the records of a car's motors, in the order of their positions."""
     records = np.zeros(len(list(motors)), MOTOR)
     for record, (place, motor) in zip(records, motors, strict=True):
         wheels = AXLES.get(place, (place, place))
@@ -227,7 +227,7 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car, without records and numbers in `state` if it has no motors.
+    """Memory of the electric drive of one car, empty without motors.
 
     `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
     """
@@ -238,12 +238,12 @@ class ElectricDrive(NamedTuple):
 
     @property
     def states(self) -> NDArray[Any]:
-        """The `MOTOR_STATE` records, a view."""
+        """View of the `MOTOR_STATE` records."""
         return self.state[BATTERY_STATE.itemsize // 8 :].view(MOTOR_STATE)
 
     @classmethod
     def of(cls, motors: Motors, battery: Battery, timestep_s: float) -> ElectricDrive:
-        """Allocate the memory of a car that has given no power yet."""
+        """Allocate the memory of a car before its first step."""
         records = motor_records(motors, timestep_s)
         size = BATTERY_STATE.itemsize + len(records) * MOTOR_STATE.itemsize if len(records) else 0
         limits = (battery.discharge_power_W, battery.charge_power_W)
@@ -258,7 +258,7 @@ STOP_BEYOND: Final = 1.03
 
 @dataclass(frozen=True)
 class ElectricActuator:
-    """A motor behind a gear, with the preset's value for each missing key."""
+    """A geared motor, with the preset's value for each missing key."""
 
     TABLE: ClassVar[str]
     """Table of the vehicle file, and of the presets."""
@@ -304,7 +304,7 @@ class ElectricActuator:
 
     @property
     def has_motor(self) -> bool:
-        """True if a motor moves the part, through a screw or a gear."""
+        """True if a motor moves the actuator, through a screw or a gear."""
         return self.preset != self.MODEL
 
     def resolved(self) -> Self:
@@ -313,17 +313,17 @@ class ElectricActuator:
         return replace(self, **{key: value for key, value in preset.items() if getattr(self, key) is None})
 
     def smooth(self) -> Self:
-        """Return the actuator without play, dry friction and position tolerance, which make slopes meaningless."""
+        """Return the actuator without play, dry friction and position tolerance, for a linear analysis."""
         loose = [item.name for item in fields(self) if item.name.startswith(_LOOSE)]
         return replace(self, **dict.fromkeys(loose, 0.0)) if self.has_motor else self
 
     @property
     def voltage_ratio(self) -> float:
-        """Supply over nominal voltage [-]."""
+        """Ratio of supply to nominal voltage [-]."""
         return known(self.supply_voltage_V) / known(self.nominal_voltage_V)
 
     def motor_numbers(self) -> dict[str, float]:
-        """Derived fields of a `SCREW` record."""
+        """Derived fields of the `SCREW` record."""
         ratio = self.voltage_ratio
         return {
             "inertia_kgm2": known(self.rotor_inertia_kgm2),
@@ -344,7 +344,7 @@ _LOOSE: Final = ("backlash", "friction_torque", "load_friction", "position_toler
 
 @functools.cache
 def presets_of(kind: type[ElectricActuator]) -> dict[str, dict[str, Any]]:
-    """Return the presets of a kind of actuator, as SI values by name and key."""
+    """Return the presets of a kind of actuator by name, as SI values by key."""
     given, source = read_toml(Path(__file__).with_name("actuator_presets.toml"))
     presets = {
         name: vars(build(kind, {"preset": name, **keys}, source, (kind.TABLE, name)))
@@ -413,7 +413,7 @@ class SuperpositionActuator(ElectricActuator):
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:
-    """Give the superposition of a model a motor: a state without a force, and a sensor of torque and limits."""
+    """Add a motor to the superposition of a model: a state without a force, and a sensor of torque and limits."""
     if spec.joint(NAME) is None or spec.actuator(NAME) is None or spec.tendon(_COLUMN) is None:
         raise ModelError(f"a motor for the superposition needs joint and actuator {NAME!r} and the tendon {_COLUMN!r}")
     added = spec.add_actuator(

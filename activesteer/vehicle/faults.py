@@ -30,7 +30,7 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Look up the faulty parts, and give the brakes sensors if a sensor may fail."""
+        """Look up the faulty parts, and add sensors to the brakes if a sensor may fail."""
         self._vehicle = vehicle
         self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
@@ -60,7 +60,7 @@ class Faults:
         return any(acting.fault.part == ANGLE_SENSOR and acting.state == native.ACTS for acting in self._acting)
 
     def act(self, step: int) -> None:
-        """Activate the faults of a step in the model, and remove the others."""
+        """Activate the faults of a step in the model, and remove all others."""
         for acting in self._acting:
             acting.release()
             if step == acting.ends:
@@ -79,7 +79,7 @@ class Faults:
         self._vehicle.act_in_every_step(None)
 
     def take_memory_of(self, other: Faults) -> None:
-        """Take over the memory of faults that are also first here, so that they continue."""
+        """Adopt the memory of the faults that both lists start with, so that they continue."""
         for acting, before in zip(self._acting, other._acting, strict=False):
             acting.memory[:] = before.memory
 
@@ -94,7 +94,7 @@ class Faults:
 
 
 class _Acting:
-    """A fault in a car that acts from step `begins` to `ends`, and stores demands from step `listens` on.
+    """A fault that is active from step `begins` to `ends`, and stores demands from step `listens` on.
 
     `delay`: steps by which it delays demands or readings. `memory`: the last of them, see `native_faults.FAULT`.
     """
@@ -114,27 +114,27 @@ class _Acting:
 
     @property
     def state(self) -> int:
-        """Current action of the fault in compiled code (see `set_fault`)."""
+        """Current state of the fault in compiled code (see `set_fault`)."""
         return int(self._own["state"])
 
     def bind(self, record: Any) -> None:
-        """Describe the fault in its record for compiled code."""
+        """Write the fault into its record for compiled code."""
         self._own = record
         record["memory"], record["capacity"] = self.memory.ctypes.data, self._capacity
 
     def turn(self, step: int) -> None:
-        """Set whether the fault is idle, stores demands or acts from this step on."""
+        """Set the state of the fault: idle, storing demands, or active."""
         listens = self._watches and self.listens <= step < self.ends
         self._own["state"] = (native.ACTS if self.begins <= step else native.LISTENS) if listens else native.IDLE
 
     def engage(self) -> None:
-        """Activate the fault in the model, if it acts there."""
+        """Activate the fault in the model, if it is a fault of the model."""
 
     def release(self) -> None:
-        """Restore the part as built."""
+        """Restore the original part."""
 
     def recover(self) -> None:
-        """Return the part to normal when the fault ends, for example a motor to its demand with lag and rate."""
+        """Let the part recover when the fault ends, for example with the lag and rate of a motor."""
 
 
 class _DemandFault(_Acting):
@@ -144,14 +144,14 @@ class _DemandFault(_Acting):
     _demand: NDArray[Any]
 
     def bind(self, record: Any) -> None:
-        """Describe the fault in its record for compiled code."""
+        """Write the fault into its record for compiled code."""
         super().bind(record)
         record["kind"] = native.DEMAND
         record["place"], record["offset"] = self._demand.ctypes.data, self._record["offset"].ctypes.data
 
 
 def part_of(vehicle: Vehicle, part: str, name: str) -> NDArray[Any]:
-    """Return one of the actuators of a part as compiled code takes it, a `PART` of shape (1,)."""
+    """Return an actuator of the part as a `PART` record for compiled code."""
     model, about, record = vehicle.model, ACTUATORS[part], np.zeros(1, native.PART)
     index = find(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     block = fb.header_of(model).ctypes.data
@@ -203,11 +203,11 @@ class _ActuatorFault(_DemandFault):
         self._set(self._kind, self.fault.size if self.fault.kind == "offset" else 0.0, held)
 
     def release(self) -> None:
-        """Restore the actuator as built."""
+        """Restore the original actuator."""
         self._set(native.WORKS)
 
     def recover(self) -> None:
-        """Start a servo that was free at its current angle (see `resume_part`)."""
+        """Let a servo return from its current angle after a fault that left it free (see `resume_part`)."""
         if self._kind == native.FLOAT:
             native.resume_of(self._part.ctypes.data, self._data.act.ctypes.data, self._data.qpos.ctypes.data)
 
@@ -238,13 +238,13 @@ class _MotorFault(_DemandFault):
             record["offset"] = FULL_TORQUE_NM if kind == "runaway" else 0.0
 
     def release(self) -> None:
-        """Restore the motor as built."""
+        """Restore the original motor."""
         for name, value in HEALTHY.items():
             self._record[name] = value
 
 
 class _SensorFault(_Acting):
-    """A fault of one signal, which changes nothing in the car."""
+    """A fault of one signal, which does not change the car."""
 
     def __init__(self, fault: Fault, vehicle: Vehicle) -> None:
         super().__init__(fault, vehicle.timestep_s)
@@ -254,7 +254,7 @@ class _SensorFault(_Acting):
         self.memory = native.memory_of(self.delay + 1 if self.delay else 1)
 
     def bind(self, record: Any) -> None:
-        """Describe the fault in its record for compiled code."""
+        """Write the fault into its record for compiled code."""
         super().bind(record)
         record["kind"], record["place"] = native.KINDS[self.fault.kind], list(SENSORS).index(self.fault.part)
         record["amount"] = self.fault.size

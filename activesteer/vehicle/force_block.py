@@ -1,4 +1,4 @@
-"""The parameters of the native forces, in a model's custom numeric data, and the layout of the engine's structs.
+"""The force block in a model's custom numeric data, and the layout of the engine's structs.
 
 One block of numbers per model holds everything the callbacks need: sizes, indices, tyres, dampers, drag, the areas of
 the road and the dynamics of the actuators. So the compiled code is the same for every car and can be cached on disk,
@@ -38,7 +38,7 @@ _DATA_BYTES: Final = 262_144
 
 
 class EngineLayout(NamedTuple):
-    """Byte offsets inside mjModel (`m_`) and mjData (`d_`): pointers to arrays, except the first two and the last."""
+    """Byte offsets in mjModel (`m_`) and mjData (`d_`), mostly of pointers to arrays."""
 
     m_nnumericdata: int
     m_timestep: int
@@ -65,7 +65,7 @@ _DATA_ARRAYS: Final = [name[2:] for name in EngineLayout._fields[3:-1]]
 
 
 def _probe(numbers: int, timestep_s: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Return a small model that has every array in question, a known count of custom numbers and a known time step."""
+    """Return a small model with every array whose offset is needed."""
     xml = f"""
     <mujoco>
       <option timestep="{timestep_s!r}"/>
@@ -117,7 +117,7 @@ def _measure(model: mujoco.MjModel, data: mujoco.MjData, numbers: int) -> Engine
 
 @functools.cache
 def engine_layout() -> EngineLayout:
-    """Return the offsets: measured once per process, and confirmed on a second, different model."""
+    """Return the struct offsets, measured once per process and confirmed on a second model."""
     first = _measure(*_probe(7919, 0.00123456789), 7919)
     second = _measure(*_probe(6421, 0.00098765432), 6421)
     if first != second:
@@ -146,19 +146,19 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
 
 
 def is_there(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
-    """Return True if an object has this name."""
+    """Return whether an object has this name."""
     return mujoco.mj_name2id(model, kind, name) >= 0
 
 
 def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
-    """Return the places of a sensor's values in `sensordata`."""
+    """Return the indices of a sensor's values in `sensordata`."""
     index = find(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
     start = int(model.sensor_adr[index])
     return slice(start, start + int(model.sensor_dim[index]))
 
 
 def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
-    """Return the change of length per coordinate for each joint of a fixed tendon, or empty without the tendon.
+    """Return the coefficients of a fixed tendon by joint, empty without the tendon.
 
     The units are those of the joints: m/rad for a hinge, 1 for a slide.
     """
@@ -271,13 +271,13 @@ USERDATA_PER_WHEEL: Final = WHEEL_OUTPUT.itemsize // 8
 
 
 def output_slot(wheel: int, name: str) -> int:
-    """Return the place in `userdata` of a field of a wheel's `WHEEL_OUTPUT`."""
+    """Return the index in `userdata` of a field of a wheel's `WHEEL_OUTPUT`."""
     assert WHEEL_OUTPUT.names is not None
     return wheel * USERDATA_PER_WHEEL + WHEEL_OUTPUT.names.index(name)
 
 
 def wheel_outputs(data: mujoco.MjData, count: int) -> NDArray[Any]:
-    """Return the callback's outputs for a number of wheels, a view of `WHEEL_OUTPUT` records."""
+    """Return a view of the callback's outputs, one `WHEEL_OUTPUT` record for each wheel."""
     return data.userdata[: count * USERDATA_PER_WHEEL].view(WHEEL_OUTPUT)
 
 
@@ -292,7 +292,7 @@ def new_header(model: mujoco.MjModel, chassis: int, chassis_dofs: list[int]) -> 
 
 
 def filled(record_type: np.dtype[Any], /, **values: Any) -> NDArray[Any]:
-    """Return one record, shape (1,), with 0 for numbers that are missing or beyond the end of a short row."""
+    """Return a record with given values, and 0 for missing numbers."""
     record = np.zeros(1, record_type)
     for name, value in values.items():
         if record[name].ndim > 1:
@@ -316,17 +316,17 @@ def pack(header: NDArray[Any], sections: Mapping[str, list[NDArray[Any]]]) -> ND
 
 
 def with_trailer(block: NDArray[np.float64], start: int) -> NDArray[np.float64]:
-    """Return the block with its trailer, for the index of its start in `numeric_data`."""
+    """Return the block with its trailer, for its start index in `numeric_data`."""
     return np.concatenate([block, (float(start), MARKER)])
 
 
 def header_of(model: mujoco.MjModel) -> NDArray[Any]:
-    """Return the header of one of our models, shape (1,), a view whose changes act from the next step on."""
+    """Return the header of a model of this package, a view whose changes act from the next step on."""
     return _view(model, 0, HEADER, 1)
 
 
 def section_of(model: mujoco.MjModel, name: str) -> NDArray[Any]:
-    """Return the records of a section of one of our models, as a view."""
+    """Return a view of the records of a section in a model of this package."""
     header = header_of(model)[0]
     return _view(model, int(header[name]), np.dtype(_SECTIONS[name]), int(header[f"n_{name}"]))
 
@@ -337,7 +337,7 @@ def _view(model: mujoco.MjModel, start: int, kind: np.dtype[Any], count: int) ->
 
 
 def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
-    """Return the first place in `sensordata` of the sensors that a callback fills, and the number of their values.
+    """Return the first index in `sensordata` of the callback's sensors, and the number of their values.
 
     Their values, and then the number of active faults, are the end of `userdata`.
     """

@@ -1,4 +1,4 @@
-"""Plan of the implicit solution, and detection of changes in the engine's memory.
+"""Plan of the implicit solution, and detection of changes in the engine's data.
 
 All features of MuJoCo 4.0's models, and who computes a step that has them. "Engine" is the engine's own `mj_step`.
 
@@ -153,7 +153,7 @@ _HANDED_OVER: Final[dict[str, Callable[[mujoco.MjModel], Any]]] = {
 
 
 def handed_over(model: mujoco.MjModel) -> list[str]:
-    """Return the features of a model that need the engine's own step, or empty if there are none."""
+    """Return the features of a model that only the engine's own step supports, empty if there are none."""
     found = [name for name, has in _HANDED_OVER.items() if has(model)]
     return found if mujoco.get_mjcb_control() is None else [*found, "mjcb_control"]
 
@@ -211,7 +211,7 @@ inertia_warning: Address of the engine's warning for an indefinite matrix: last 
 
 
 class ImplicitPlan:
-    """The plan of one car and the memory that it points to.
+    """Plan of one car, with the memory that it points to.
 
     Attributes:
         plan: `IMPLICIT_PLAN`, shape (1,), at an address that stays.
@@ -278,7 +278,7 @@ class ImplicitPlan:
         return (*_options(self._model.opt), mujoco.get_mjcb_control())
 
     def follow(self) -> None:
-        """Plan again if data of the model that the plan has frozen have changed.
+        """Plan again if the data behind the plan have changed.
 
         This takes two microseconds if nothing has changed. All other changes count in each step anyway.
         """
@@ -300,7 +300,7 @@ _options: Final = operator.attrgetter(*OPTIONS)
 
 
 def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Discard the data that the engine prepared for its own solution and would partly renew in every step."""
+    """Remove the data that the engine prepared for its own solution, and would update in every step."""
     integrator = model.opt.integrator
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
     mujoco.mj_fwdPosition(model, data)
@@ -308,7 +308,7 @@ def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _sensed_body(model: mujoco.MjModel) -> int:
-    """Return the body whose acceleration is the only sensed one, or 0 without such a body."""
+    """Return the only body with a sensed acceleration, 0 without one."""
     late = np.flatnonzero(model.sensor_needstage == int(mujoco.mjtStage.mjSTAGE_ACC))
     if (model.sensor_type[late] != int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)).any():
         return 0
@@ -321,7 +321,7 @@ _structures: dict[bytes, tuple[list[NDArray[np.int32]], int]] = {}
 
 
 def _known_tables(model: mujoco.MjModel) -> tuple[list[NDArray[np.int32]], int]:
-    """Return the tables in the order of their names, and the size of the factor, cached by structure."""
+    """Return the tables of the plan and the size of the factor, cached by structure."""
     structure = b"|".join(getattr(model, name).tobytes() for name in _STRUCTURE)
     if structure not in _structures:
         if len(_structures) >= _MAX_STRUCTURES:
@@ -374,7 +374,7 @@ def _mass_columns(model: mujoco.MjModel, dof: int) -> NDArray[Any]:
 
 
 def _tendon_entries(model: mujoco.MjModel, tendon: int) -> NDArray[np.intp]:
-    """Return the elements of `ten_J` of a tendon that are not always zero.
+    """Return the elements of `ten_J` of a tendon that may differ from zero.
 
     The engine keeps the elements of all joints between the tendon's ends and the world. A joint that moves both ends
     as one body, such as the free joint of the chassis, does not change the length.
@@ -400,7 +400,7 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def _elimination(cliques: Sequence[NDArray[Any]], size: int) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-    """Find an order of elimination with little fill: always the unknown with the fewest neighbours left."""
+    """Return an order of elimination with little fill: always the unknown with the fewest neighbours first."""
     meets = np.eye(size, dtype=bool)
     for clique in cliques:
         meets[np.ix_(clique, clique)] = True

@@ -40,7 +40,7 @@ _WIND_UP: Final = ("_brake", "rack_friction")
 
 
 class LocalState:
-    """The state of a vehicle as one vector of differences from a reference state.
+    """State of a vehicle as a vector of differences from a reference state.
 
     The vector holds coordinates (roll and pitch as rotations about the chassis' axes), velocities (of the chassis'
     origin along heading, left, up; rotations about the chassis' axes), and activations (servos, carcass deflections of
@@ -56,7 +56,7 @@ class LocalState:
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Take the current state of the vehicle, which rolls along the world's x axis, as the reference."""
+        """Set the current state of the vehicle, which rolls along the world's x axis, as the reference."""
         self.vehicle = vehicle
         model = vehicle.model
         if model.opt.gravity[1] != 0.0 or fb.header_of(model)["n_surfaces"][0] != 0.0:
@@ -94,14 +94,14 @@ class LocalState:
         self.take_reference()
 
     def take_reference(self) -> None:
-        """Move the car to the origin, heading along x, and take its state as the reference."""
+        """Move the car to the origin, heading along x, and set its state as the reference."""
         self._turn_home()
         data = self.vehicle.data
         self._qpos, self._qvel, self._act = data.qpos.copy(), data.qvel.copy(), data.act.copy()
         self._state = self.vehicle.save_state()
 
     def read(self) -> Array:
-        """Move the car to the origin, and return its difference from the reference, shape (len(names),)."""
+        """Move the car to the origin, and return its difference from the reference."""
         self._turn_home()
         data, model = self.vehicle.data, self.vehicle.model
         difference = np.empty(model.nv)
@@ -111,7 +111,7 @@ class LocalState:
         )
 
     def write(self, difference: Array) -> None:
-        """Set the vehicle to the reference plus a difference, shape (len(names),)."""
+        """Set the vehicle to the reference plus a difference."""
         vehicle = self.vehicle
         data, model = vehicle.data, vehicle.model
         vehicle.restore_state(self._state)
@@ -123,7 +123,7 @@ class LocalState:
         data.act[self._activations] += difference[count + model.nv :]
 
     def _turn_home(self) -> None:
-        """Put the car at the origin of the road with heading 0, unturned wheels and the same motion."""
+        """Move the car to the origin of the road with heading 0 and unturned wheels, and keep its motion."""
         data = self.vehicle.data
         # The heading of the chassis' x axis (ISO 8855) does not change with a rotation about that axis.
         turn_chassis_back(data, 0.5 * float(yaw_of(data.qpos[3:7])))
@@ -170,7 +170,7 @@ _MIN_LIKENESS: Final = 0.9
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode, or a conjugate pair.
+    """One mode: a real pole or a conjugate pair.
 
     Its name is that of the part that takes part most. The eigenvalue has no negative imaginary part; the participation
     factors have the sum 1, largest first. `shape` and `left` are right and left eigenvector, whose product is 1.
@@ -189,7 +189,7 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """Damping ratio [-], or 1 for a mode that decays without oscillation."""
+        """Damping ratio [-], 1 for a mode that decays without oscillation."""
         return -self.eigenvalue_1ps.real / abs(self.eigenvalue_1ps)
 
     def to_json(self) -> dict[str, Any]:
@@ -202,7 +202,7 @@ class Mode:
 
 
 def find_modes(a: NDArray[np.float64], states: tuple[str, ...], timestep_s: float) -> list[Mode]:
-    """Find the modes of a system in discrete time."""
+    """Return the modes of a discrete-time system."""
     try:
         values, right = np.linalg.eig(a)
         left = np.linalg.inv(right)
@@ -244,7 +244,7 @@ def _part_of(state: str) -> str:
 
 
 def _sides(shape: NDArray[np.complex128], participation: NDArray[np.float64], states: tuple[str, ...]) -> str:
-    """Return ` parallel` or ` opposite` for the motion of left and right wheels in a mode."""
+    """Return a suffix that tells parallel from opposite motion of left and right wheels in a mode."""
     top = states[int(participation.argmax())]
     match = re.search(r"(?<![a-z])([fr])([lr])_", top)
     if match is None:

@@ -1,4 +1,4 @@
-"""MJCF and vehicle parameters to a compiled MuJoCo model: its load, its factors, its tyres, dampers and actuators."""
+"""Build of the MuJoCo model of a car from MJCF and vehicle parameters."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
 
 def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
-    """Return the masses on the car and their positions, vehicle axes [kg], [m]."""
+    """Return mass and position of each load on the car, in vehicle axes [kg], [m]."""
     data = mujoco.MjData(bare)
     mujoco.mj_kinematics(bare, data)
     front, rear = (data.xpos[[bare.body(f"{corner}_wheel").id for corner in pair], 0].mean() for pair in _AXLES)
@@ -96,7 +96,7 @@ def _points(bare: mujoco.MjModel, load: Load) -> list[tuple[float, Array]]:
 
 
 def _scale_springs(spec: mujoco.MjSpec, bare: mujoco.MjModel, factors: Factors) -> None:
-    """Change the rates of springs and anti-roll bars, and keep the force of a spring in the design position."""
+    """Scale springs and anti-roll bars, and keep the spring forces in the design position."""
     for tendon in spec.tendons:
         if tendon.name.endswith("_anti_roll_bar"):
             tendon.stiffness = factors.anti_roll_bar * np.asarray(tendon.stiffness)
@@ -129,7 +129,7 @@ def load_model(
     timestep_s: float,
     content: Mapping[str, bytes] | None = None,
 ) -> mujoco.MjModel:
-    """Compile a car, or copy it if it was compiled recently."""
+    """Compile a car, or copy a recently compiled one."""
     if not content:
         return _compile(mjcf, parameters, tyres, road, timestep_s)
     # Controllers and their single-track model are in the vehicle file, but are not part of the car.
@@ -182,7 +182,7 @@ def _compile(
 
 
 def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Set up the actuators of drive, brakes, friction and servos, which act with the activation at the step's end."""
+    """Set up the actuators, whose new activation acts within the same step."""
     for actuator in spec.actuators:
         if actuator.name.endswith("_drive"):
             actuator.dyntype = mujoco.mjtDyn.mjDYN_USER
@@ -197,7 +197,7 @@ def _fit_actuators(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
 
 
 def _friction(actuator: str, parameters: VehicleParameters) -> tuple[float, float]:
-    """Return force [N] and stiffness [N/m] of the dry friction that an actuator represents."""
+    """Return force [N] and stiffness [N/m] of a dry friction actuator."""
     friction = parameters.friction
     if actuator == "rack_friction":
         return friction.rack_N, friction.rack_stiffness_Npm
@@ -339,7 +339,7 @@ def _damper(model: mujoco.MjModel, corner: str, parameters: VehicleParameters) -
 def _actuator(
     model: mujoco.MjModel, index: int, parameters: VehicleParameters, places: Mapping[str, tuple[float, int]]
 ) -> NDArray[Any]:
-    """Return the record of one actuator for the callback that computes its rate."""
+    """Return the record of one actuator for the activation callback."""
     if int(model.actuator_dyntype[index]) != _USER_DYNAMICS:
         return fb.filled(fb.ACTUATOR, kind=fb.KIND_NONE, **fb.IN_ORDER)
     name, act = model.actuator(index).name, model.actuator_actadr[index]
@@ -351,7 +351,7 @@ def _actuator(
 
 
 def _dynamics(model: mujoco.MjModel, index: int, name: str, parameters: VehicleParameters) -> dict[str, float]:
-    """Return the kind of an actuator, and its fields."""
+    """Return the kind of an actuator, and the fields of its record."""
     corner, _, state = name.partition("_")
     if state in SLIP_RATES:
         return {"kind": fb.KIND_SLIP, "userdata": fb.output_slot(CORNERS.index(corner), SLIP_RATES[state])}

@@ -1,4 +1,4 @@
-"""Servos, drive, brakes, screws, motors and dry friction in compiled code.
+"""Compiled dynamics of servos, drive, brakes, screws, motors and dry friction.
 
 A guide or seal first deflects elastically, then slips: Dahl's model. Its state w is the elastic deflection, its force
 -k w:
@@ -65,7 +65,7 @@ def _polynomial(coefficients, x):
 
 @inlined
 def _played(link, screw_m, longer_m):
-    """Return the change of a link's length, limited to its play."""
+    """Return the change of a link's length, limited to the play about the screw's position."""
     half = 0.5 * link.backlash_m
     return min(max(longer_m, screw_m - half), screw_m + half)
 
@@ -80,7 +80,7 @@ def _link_rate(link, state, act, ten_length, userdata, timestep_s):
 
 @inlined
 def _motor_load(links, screw, act, ten_length):
-    """Return the load torque at the motor, positive if it drives forwards, and the sum of its parts' sizes [N m]."""
+    """Return the load torque at the motor, positive if it drives forwards, and the sum of magnitudes [N m]."""
     lead = screw.lead_mprad
     if screw.n_links == 0.0:
         stretch = ten_length[int(screw.column)] - screw.column_rest_m
@@ -98,7 +98,7 @@ def _motor_load(links, screw, act, ten_length):
 
 @inlined
 def _motor_limits(screw, speed):
-    """Return the least and the greatest torque that current, voltage and power allow at a speed [N m]."""
+    """Return the limits of the torque by current, voltage and power at a speed [N m]."""
     high = min(screw.peak_Nm, max(screw.stall_Nm - screw.slope_Nmsprad * speed, 0.0))
     low = -min(screw.peak_Nm, max(screw.stall_Nm + screw.slope_Nmsprad * speed, 0.0))
     if speed > 0.0:
@@ -110,7 +110,7 @@ def _motor_limits(screw, speed):
 
 @inlined
 def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, timestep_s):
-    """Return the rate of a motor's speed, from both loops within their limits, load and dry friction."""
+    """Return the acceleration of a motor under its control loops, load and dry friction."""
     said = int(screw.userdata)
     userdata[said] = userdata[said + 1] = 0.0
     if screw.seized != 0.0:
@@ -147,7 +147,7 @@ def _motor_rate(links, screw, asked, act, ctrl, ten_length, userdata, speed, tim
 
 @inlined
 def screw_rate(block, header, actuators, entry, act, ctrl, ten_length, userdata, timestep_s):
-    """Return the rate of a screwed link's change of length, of a screw's position, or of its motor's speed."""
+    """Return the rate of a screwed link's length, of a screw's position, or of its motor's speed."""
     state = act[int(entry.act)]
     if entry.kind == fb.KIND_LINK:
         link = _links_at(block, header.links, header.n_links)[int(entry.record)]
@@ -168,7 +168,7 @@ _SLOW = 1e-4
 def friction_rate(
     deflection_m: float, speed_mps: float, vibration_mps: float, slip_m: float, timestep_s: float
 ) -> float:
-    """Return the mean rate of the elastic deflection over a step, exact for a constant speed."""
+    """Return the mean rate of an elastic deflection over a step, exact for a constant speed."""
     if slip_m <= 0.0:
         return -deflection_m / timestep_s
     speed = abs(speed_mps)
@@ -184,14 +184,14 @@ def friction_rate(
 
 @inlined
 def servo_rate(entry, command, state):
-    """Return the rate of a servo: a first-order lag behind the limited command, with a rate limit."""
+    """Return the rate of a servo: first-order lag with limits of command and rate."""
     rate = (min(max(command, entry.low), entry.high) - state) / entry.lag_s
     return min(max(rate, -entry.rate_limit), entry.rate_limit)
 
 
 @inlined
 def drive_rate(wheels, header, entry, qvel, command, state, timestep_s):
-    """Return the rate of a wheel's drive torque: a first-order lag, within the limits of the engine.
+    """Return the rate of a wheel's drive torque: first-order lag within the limits of the engine.
 
     A motor has its dynamics in `step_motors`; its torque is the command.
     """
@@ -219,7 +219,7 @@ def drive_rate(wheels, header, entry, qvel, command, state, timestep_s):
 
 @inlined
 def brake_rate(entry, qvel, command, state, timestep_s):
-    """Return the rate of elasto-plastic friction: the pads wind up with the wheel and slip at the demanded torque."""
+    """Return the rate of an elasto-plastic brake: it twists with the wheel and slips at the demanded torque."""
     speed = qvel[int(entry.dof)]
     # Drag of pads, bearings and seals acts always; it also keeps a car at rest from creeping.
     limit = min(max(command, entry.low), entry.high) / entry.stiffness
@@ -229,7 +229,7 @@ def brake_rate(entry, qvel, command, state, timestep_s):
 
 @inlined
 def dry_friction_rate(entry, qvel, ten_velocity, state, timestep_s):
-    """Return the rate of the dry friction of a damper on a vibrating road, or of the rack."""
+    """Return the rate of the dry friction of a damper or of the rack."""
     speed = ten_velocity[int(entry.tendon)] if entry.tendon >= 0.0 else qvel[int(entry.dof)]
     # The free joint of the chassis comes first (`Vehicle` checks it): its velocity in the world.
     vibration = entry.vibration * (qvel[0] * qvel[0] + qvel[1] * qvel[1]) ** 0.25
@@ -250,7 +250,7 @@ _STANDSTILL_RADPS: Final = 1.0
 
 @inlined
 def _drive_motor_limits(motor, speed_radps):
-    """Return the least and the greatest torque of a motor at its wheels together, at their mean speed."""
+    """Return the limits of a motor's torque at its wheels together, at their mean speed [N m]."""
     shaft_radps = abs(speed_radps) * motor.gear
     count = int(motor.points)
     top = motor.speed_radps[count - 1]
@@ -286,7 +286,7 @@ def _mechanical_power(motor, state, qvel, spins):
 
 @inlined
 def _use_battery(motors, states, battery, given, qvel, spins):
-    """Scale torques down where the battery is at a limit, and write the powers of motors and battery."""
+    """Scale torques down if the battery is at a limit, and write the powers of motors and battery."""
     total_W, driving_W, absorbing_W = battery.auxiliary_W, 0.0, 0.0
     for index in range(len(motors)):
         motor, state = motors[index], states[index]

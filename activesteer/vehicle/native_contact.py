@@ -1,4 +1,4 @@
-"""Contact of a wheel with an uneven road: the effective plane for the tyre.
+"""Contact of a wheel with an uneven road, reduced to an effective plane.
 
 The tyre's formula needs a plane. Three ways lead to it, from the place straight below the lowest point of the wheel:
 
@@ -65,7 +65,7 @@ point in steps of `_CAM_STEP_M`, and half the width over which the sideways slop
 
 
 def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
-    """Return the cams of a tyre, a `CAM` of shape (1,)."""
+    """Return the cams of a tyre, a `CAM` record."""
     radius = tyre["UNLOADED_RADIUS"]
     half_length, half_height, order = (
         tyre["ELLIPS_LENGTH"] * radius, tyre["ELLIPS_HEIGHT"] * radius, tyre["ELLIPS_ORDER"],
@@ -79,7 +79,7 @@ def cam_record(tyre: TyreParameters, pressure_Pa: float) -> NDArray[Any]:
 
 @compiled
 def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s, d, ahead_s, ahead_d):
-    """Return height of the lowest point of a cam, and its change per metre forwards."""
+    """Return height and forward slope of a cam at its lowest point."""
     best, at = -math.inf, 0.0
     count = math.ceil(reach / coarse)
     for index in range(-count, count + 1):
@@ -137,7 +137,7 @@ def _drop(cam, x):
 def contact_plane(
     surface, numbers, obstacles, cam, along, across, cos, sin, stretch, heading_x, heading_y, free_radius
 ):
-    """Return height, forward slope, sideways slope and forward change of slope [1/m] of the plane that a tyre feels."""
+    """Return the effective plane of a tyre: height, slopes, and change of the forward slope [1/m]."""
     first, last, highest = near_obstacles(obstacles, along, across)
     if first >= last and surface.rows == 0.0 and surface.slopes == 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -178,7 +178,7 @@ def contact_plane(
 
 @compiled
 def plane_axes(forward, sideways, heading_x, heading_y):
-    """Return normal and two axes of a plane, nine components in world axes, the first axis above world x."""
+    """Return normal and axes of a plane in world axes, with the first axis above world x."""
     slope_x = forward * heading_x - sideways * heading_y
     slope_y = forward * heading_y + sideways * heading_x
     nz = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
@@ -191,7 +191,7 @@ def plane_axes(forward, sideways, heading_x, heading_y):
 
 @compiled
 def spin_on_bend(p, spin, speed, bend, loaded_radius, pressure_Pa):
-    """Return the spin that a tyre feels on a road that bends along its heading [rad/s].
+    """Return the spin of a tyre on a road that bends along its heading [rad/s].
 
     The tread rolls off on the road at the effective rolling radius relative to the normal of the plane, which turns
     with the speed times the bend. The contact point lags behind the centre by the loaded radius times that rate.

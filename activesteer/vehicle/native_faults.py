@@ -1,4 +1,4 @@
-"""Faults in compiled code: of actuators, delayed demands, and wrong readings of sensors."""
+"""Compiled faults of actuators, delayed demands, and faulty readings of sensors."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def memory_of(capacity: int) -> np.ndarray:
 
 @shared
 def oldest(memory, capacity):
-    """Return the oldest kept number."""
+    """Return the oldest stored number."""
     return memory[2 + (int(memory[1]) if memory[0] == capacity else 0)]
 
 
 @shared
 def keep(memory, capacity, value):
-    """Keep a number, instead of the oldest one if the memory is full."""
+    """Store a number, which replaces the oldest one in a full memory."""
     place = int(memory[1])
     memory[2 + place], memory[1] = value, (place + 1) % capacity
     memory[0] = min(memory[0] + 1.0, float(capacity))
@@ -52,7 +52,7 @@ def keep(memory, capacity, value):
 
 @inlined
 def give_late(address, count):
-    """Write the delayed demand of each part with such a fault, before a step."""
+    """Apply the delayed demand of each part with such a fault, before a step."""
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state == ACTS:
@@ -72,7 +72,7 @@ def keep_demands(address, count):
 
 @inlined
 def misread(address, count, outputs):
-    """Change the outputs of the sensors, in the order of the faults."""
+    """Change the outputs of the faulty sensors, in the order of the faults."""
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND or fault.state == IDLE:
@@ -132,7 +132,7 @@ def exchange_health(part, block, gain, bias, healthy, save):
 
 @inlined
 def fail_part(part, block, gain, bias, healthy, kind, offset, held):
-    """Write a fault of an actuator into the model, in place of what was there."""
+    """Write a fault of an actuator into the model, and replace an earlier fault."""
     exchange_health(part, block, gain, bias, healthy, False)
     record = part.record
     if kind in (WORKS, OFFSET):  # an exported car that works can have an offset
@@ -164,7 +164,7 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def set_fault(part, block, gain, bias, healthy, kind, offset, held):
-    """Carry out `fail_part` by addresses, or save the healthy numbers if the kind is negative."""
+    """Call `fail_part` by addresses, or save the original numbers if the kind is negative."""
     own = carray(_part_pointer(part), (1,))[0]
     numbers = f64_pointer(block), f64_pointer(gain), f64_pointer(bias), f64_pointer(healthy)
     if kind < 0:
@@ -175,14 +175,14 @@ def set_fault(part, block, gain, bias, healthy, kind, offset, held):
 
 @inlined
 def resume_part(part, act, qpos):
-    """Start a servo that was free at its current angle. It returns with its own lag and rate."""
+    """Release a servo from its current angle, to return with its own lag and rate."""
     if part.seized == 0:
         act[part.act] = qpos[part.qpos]
 
 
 @inlined
 def change_fault(part, block, gain, bias, healthy, acting, kind, offset, ctrl, act, qpos):
-    """Replace the fault of a part, with kind, offset and the demand of a stuck brake in `acting`."""
+    """Change the fault of a part: kind, offset, and demand of a stuck brake."""
     own, before = carray(_part_pointer(part), (1,))[0], f64_pointer(acting)
     if before[0] == FLOAT and kind != FLOAT:
         resume_part(own, f64_pointer(act), f64_pointer(qpos))

@@ -1,4 +1,4 @@
-"""The native callbacks: tyres, dampers, drag and curve axles as passive forces, and the dynamics of our actuators.
+"""The native callbacks: passive forces of tyres, dampers, drag and curve axles, and actuator dynamics.
 
 Compiled once by numba, cached on disk, called by the engine without any Python. They are pure functions of the state:
 their output in `userdata` is scratch for the recorder, written anew at every evaluation. Models without our block are
@@ -52,7 +52,7 @@ curve."""
 
 @inlined
 def _our_block(model, m_count, m_numbers):
-    """Return the address of the block of one of our models, or 0."""
+    """Return the address of the force block of a model of this package, 0 for other models."""
     count = word(model + m_count)
     address = word(model + m_numbers)
     numbers = carray(f64_pointer(address), (count,))
@@ -75,7 +75,7 @@ def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
 
 @inlined
 def _interpolate(x, xs, ys, count):
-    """Evaluate a piecewise linear curve, continued with the slope of its ends."""
+    """Evaluate a piecewise linear curve, extrapolated at its ends."""
     index = 1
     while index < count - 1 and x > xs[index]:
         index += 1
@@ -84,7 +84,7 @@ def _interpolate(x, xs, ys, count):
 
 @inlined
 def _road_mu(block, header, mu, x, y):
-    """Return the friction of the road at a place on it [m], `mu` outside all areas."""
+    """Return the friction of the road at a position on it [m]."""
     if header.areas_felt == 0.0:
         return mu
     areas = _areas_at(block, header.areas, header.n_areas)
@@ -97,7 +97,7 @@ def _road_mu(block, header, mu, x, y):
 
 @inlined
 def _place_on_road(block, header, x, y):
-    """Return the place x, y [m] of the world along the road, as `along_path` does."""
+    """Convert a position in the world to a position along the road [m], as `along_path` does."""
     if header.n_path_grids == 0.0 or header.areas_felt == 0.0:
         return x, y, 1.0, 0.0, 0.0
     grid = _path_grids_at(block, header.path_grids, 1)[0]
@@ -114,7 +114,7 @@ def _across(axes, first, x, y, z):
 
 @inlined
 def _back(axes, x, y, z):
-    """Return a vector of the plane in world axes."""
+    """Convert a vector of the plane to world axes."""
     return (
         axes[3] * x + axes[6] * y + axes[0] * z,
         axes[4] * x + axes[7] * y + axes[1] * z,
@@ -256,7 +256,7 @@ def _dampers(block, header, ten_velocity, jacobian, userdata, qfrc):
 
 @inlined
 def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
-    """Add aerodynamic drag: against the velocity of the pressure point, in the plane of the road."""
+    """Add aerodynamic drag, against the velocity of the pressure point in the road plane."""
     body = int(header.chassis_body)
     root = int(header.chassis_root)
     ax, ay, az = header.aero_point_m[0], header.aero_point_m[1], header.aero_point_m[2]
@@ -360,7 +360,7 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
 
 @compiled_callback(types.double)
 def _no_clock():
-    """Replace the clock that the engine reads some twenty times per step for unused statistics."""
+    """Replace the clock that the engine reads about twenty times per step."""
     return 0.0
 
 
@@ -407,7 +407,7 @@ def _install() -> None:
 
 
 def remove_native_forces() -> None:
-    """Remove only our callbacks from this process, for example to measure the bare engine."""
+    """Remove our callbacks from this process, for example to measure the bare engine."""
     for _, present, install in _SLOTS:
         if any(present() is ours for ours in _installed):
             install(None)

@@ -1,4 +1,4 @@
-"""A step of the engine with the accelerations found directly (see `implicit_plan`).
+"""Step of the engine with a direct solution of the accelerations (see `implicit_plan`).
 
 Everything but the solution is the engine's: its own functions for positions, mass matrix, tendons, forces, sensors and
 integration are called one by one. The engine's own step does it all while a joint touches its limit, while a force acts
@@ -47,7 +47,7 @@ def _engine(function, plan):
 
 @inlined
 def _engine_must(plan):
-    """Return True if the step needs the engine: a joint touches its limit, or a force acts on a body."""
+    """Return whether this step needs the engine's solution: a joint touches its limit, or a force acts on a body."""
     if plan.direct == 0:
         return True
     limited, places = _indices(plan.limited), _indices(plan.limited_qpos)
@@ -65,13 +65,13 @@ def _engine_must(plan):
 
 @inlined
 def _stiffness(a, b, c, x):
-    """Return the slope of the force a x + b x^2 + c x^3, at least 0."""
+    """Return the slope of the force a x + b x^2 + c x^3, limited to at least 0."""
     return max(0.0, a + x * (2.0 * b + x * 3.0 * c))
 
 
 @inlined
 def _assemble(plan):
-    """Write M + h D + h^2 K to the entries of the factor, and f - h K v in the order of elimination.
+    """Write the matrix M + h D + h^2 K and the right side f - h K v, in the order of elimination.
 
     Negative damping and stiffness count as 0 in D and K, as in the engine; the forces hold them anyway.
     """
@@ -134,7 +134,7 @@ def _assemble(plan):
 
 @inlined
 def _factorise(plan):
-    """Factorise in place into unit upper triangular rows times diagonal, and store the diagonal's reciprocals."""
+    """Factorise in place (unit upper triangular, diagonal), and store the reciprocals of the diagonal."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     update = _indices(plan.update)
     target = 0
@@ -156,7 +156,7 @@ def _factorise(plan):
 
 @inlined
 def _warn(plan, bad):
-    """Count a warning of the engine for an indefinite matrix, with the degree of freedom at a place."""
+    """Count a warning of the engine for an indefinite matrix."""
     place, warning = _indices(plan.place), _indices(plan.inertia_warning)
     for dof in range(plan.n_place):
         if place[dof] == bad:
@@ -166,7 +166,7 @@ def _warn(plan, bad):
 
 @inlined
 def _solve(plan):
-    """Solve for the accelerations, from the factor and the right side."""
+    """Solve for the accelerations with the factor."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
     column, x = _indices(plan.column), f64_pointer(plan.right_side)
     for place in range(plan.n_row):
@@ -187,7 +187,7 @@ def _solve(plan):
 
 @inlined
 def _accelerate(plan):
-    """Find the accelerations that the sensors feel, including gravity, which the engine does not compute again."""
+    """Compute the sensed accelerations, including gravity, which the engine does not compute again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return

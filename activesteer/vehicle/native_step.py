@@ -1,4 +1,4 @@
-"""One step of the engine in one native call, from commands to a row for the recorder and the measurement.
+"""One native step of the engine, from commands to a recorded row and a measurement.
 
 The call releases Python's lock. It finds everything through `STEP_BINDINGS`, addresses and indices that a vehicle looks
 up once, so the compiled code is the same for every car.
@@ -68,7 +68,7 @@ def _all_finite(address, size):
 
 @inlined
 def _sense(bindings, measurement_address, motion_address):
-    """Write the numbers of the true `Measurement` and `Motion`, and return whether the state is valid."""
+    """Write the true `Measurement` and `Motion`, and return whether the state is valid."""
     s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
     yaw_rate = carray(f64_pointer(bindings.qvel), (bindings.n_dofs,))[YAW_DOF]
     speed = s[bindings.velocimeter]
@@ -114,7 +114,7 @@ def _copy(source_address, target_address, size):
 
 @inlined
 def _record(bindings, tape):
-    """Copy the recorded arrays onto a tape, one after the other, and the poses of the bodies when they are due."""
+    """Copy the recorded arrays onto a tape, and the poses of the bodies when they are due."""
     if tape.room == 0:
         return
     place = tape.row
@@ -133,7 +133,7 @@ def _record(bindings, tape):
 
 @inlined
 def _engage(bindings, gear):
-    """Couple the engine to the wheels, or free them."""
+    """Connect the engine to the wheels, or disconnect it."""
     f64_pointer(bindings.gear)[0] = gear
     for wheel in range(_N_WHEELS):
         carried = bindings.free_kgm2[wheel] if gear == CLUTCH_OPEN else bindings.engaged_kgm2[wheel]
@@ -142,7 +142,7 @@ def _engage(bindings, gear):
 
 @inlined
 def _with_grip(setup, state, wheel, torque_Nm):
-    """Return the demand at a motor's wheel, reduced by traction control if the wheel spins or locks."""
+    """Return the demand at a motor's wheel, reduced if the wheel spins or locks."""
     if setup.tcs == 0.0 or torque_Nm == 0.0:
         return torque_Nm
     faster_mps = state.wheel_mps[wheel] - state.reference_mps
@@ -158,13 +158,13 @@ def sense(bindings_address, measurement_address, motion_address):
 
 @compiled_call(types.void, types.intp, types.float64)
 def engage(bindings_address, gear):
-    """Couple the engine to the wheels, or free them, between two steps."""
+    """Connect the engine to the wheels, or disconnect it, between two steps."""
     _engage(carray(_bindings_pointer(bindings_address), (1,))[0], gear)
 
 
 @inlined
 def _set_inputs(bindings, commands_address, torques_set):
-    """Write the inputs of all actuators of the engine (see `carry_out`)."""
+    """Set the inputs of all actuators of the engine (see `carry_out`)."""
     commands = carray(_command_pointer(commands_address), (1,))[0]
     gear = float(CLUTCH_OPEN) if torques_set else commands.gear
     if gear != f64_pointer(bindings.gear)[0]:
@@ -254,7 +254,7 @@ def step(bindings_address, commands_address, torques_set, measurement_address, m
 
 @compiled_call(types.void, types.intp, types.Array(types.float64, 2, "C"))
 def replay(bindings_address, inputs):
-    """Advance the engine by one step for each row of inputs, and do nothing else."""
+    """Advance the engine by one step for each row of inputs."""
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
     implicit = carray(implicit_plan_pointer(bindings.implicit), (1,))[0]
     ctrl = f64_pointer(bindings.ctrl)

@@ -1,4 +1,4 @@
-"""Parameters of the car in a vehicle file, and the torque of an engine at its driven wheels.
+"""Parameters of the car in a vehicle file, and the torque limits of its engine.
 
 The driver always uses the gear with the highest torque. Over all gears that is a constant torque, the first gear's, up
 to the speed at which the engine reaches its highest power, and constant power above:
@@ -55,7 +55,7 @@ Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 @dataclass(frozen=True)
 class TyreFitment:
-    """Tyres of the car, and their behaviour near standstill."""
+    """Tyre files of the car, and tyre behaviour near standstill."""
 
     front: str
     """Tyre file of the front wheels, a name in models/tyres or a path."""
@@ -76,7 +76,7 @@ class TyreFitment:
 
 @dataclass(frozen=True)
 class DamperCurve:
-    """Force of a damper over its velocity, piecewise linear, compression positive."""
+    """Force of a damper versus velocity, piecewise linear, compression positive."""
 
     velocity_mps: tuple[float, ...]
     """Compression velocities, increasing [m/s]."""
@@ -90,7 +90,7 @@ class DamperCurve:
 
 @dataclass(frozen=True)
 class Dampers:
-    """One curve per axle, along the damper."""
+    """Damper curves, one per axle."""
 
     front: DamperCurve
     rear: DamperCurve
@@ -102,7 +102,7 @@ VIBRATION_AT_MPS: Final = 80.0 / 3.6
 
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction, independent of speed: elastic until it slips (see `native_actuators`)."""
+    """Dry friction, independent of speed and elastic until it slips (see `native_actuators`)."""
 
     front_damper_N: NotNegative = 0.0
     """Seal, piston and rod guide of a front damper or strut, along it [N]."""
@@ -120,7 +120,7 @@ class Friction:
 
 @dataclass(frozen=True)
 class Powertrain:
-    """Engine, gearbox and differentials: torque at the driven wheels and its distribution (see `drive_limits`).
+    """Engine, gearbox and differentials: torque of the driven wheels and its distribution (see `drive_limits`).
 
     On axles with motors the torques and the power are the limits of the driver's demand, which motors carry out.
     """
@@ -174,7 +174,7 @@ class Aerodynamics:
 
 @dataclass(frozen=True)
 class Load:
-    """Load of the car in addition to its model: masses at points of the chassis (see `loading`)."""
+    """Load of the car in addition to its model (see `loading`)."""
 
     KEY_HINTS: ClassVar = _MASS_HINTS
 
@@ -207,7 +207,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Factors:
-    """Factors on the car as modelled, default 1 (see `loading`)."""
+    """Factors on the modelled car, 1 by default (see `loading`)."""
 
     KEY_HINTS: ClassVar = dict.fromkeys(("mass_kg", "payload_kg"), _MASS_HINT)
 
@@ -243,7 +243,7 @@ class Factors:
     """Factor on the lag of the model's servos of rear wheels and superposition. A screw and a motor have none."""
 
     def on_tyres(self, front: TyreParameters, rear: TyreParameters) -> tuple[TyreParameters, TyreParameters]:
-        """Return the tyres of both axles with their scale factors multiplied, unchanged if all factors are 1."""
+        """Return the tyres of both axles with scaled coefficients."""
         axles = (
             (self.front_cornering_stiffness, self.front_tyre_friction),
             (self.rear_cornering_stiffness, self.rear_tyre_friction),
@@ -327,7 +327,7 @@ class VehicleParameters:
 
     @property
     def engine_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`, all 0 without an engine."""
+        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`."""
         share = self.engine_share or 1.0
         front, _, rear, _ = self.powertrain.wheel_fractions
         front, rear = (0.0 if self.motors.on(ax) else part / share for ax, part in (("front", front), ("rear", rear)))
@@ -335,13 +335,13 @@ class VehicleParameters:
 
     @property
     def engine_share(self) -> float:
-        """Fraction of the driver's demand that the engine provides, not the motors [-]."""
+        """Fraction of the driver's demand that the engine provides [-], not the motors."""
         front = self.powertrain.front_fraction
         return 1.0 - sum(part for axle, part in (("front", front), ("rear", 1.0 - front)) if self.motors.on(axle))
 
     @property
     def drive(self) -> Powertrain:
-        """Powertrain in the form that its driver knows, with limits that the motors of each axle can deliver."""
+        """Powertrain for the driver, with the torque limits of engine and motors."""
         engine, (front, _, rear, _) = self.powertrain, self.powertrain.wheel_fractions
         torques_Nm, powers_W = [engine.max_torque_Nm], [engine.max_power_W]
         for axle, fraction in (("front", 2.0 * front), ("rear", 2.0 * rear)):
@@ -365,7 +365,7 @@ idling at 800 1/min in first gear."""
 def drive_limits(
     speed_radps: float, gear: int, torque_Nm: float, power_W: float, limit_radps: float, drag_Nm: float
 ) -> tuple[float, float]:
-    """Return the least and the greatest torque of the drive."""
+    """Return the limits of the drive torque."""
     speed = gear * speed_radps
     high, low = torque_Nm, 0.0
     if speed > 0.0:
@@ -395,7 +395,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
 
 
 class PowertrainLimits:
-    """Drive in the form that its driver knows: torque limits at the current speed of the wheels.
+    """Drive for the driver: torque limits at the current speed of the wheels.
 
     Attributes:
         fractions: Fraction of the torque that each wheel gets.
@@ -403,7 +403,7 @@ class PowertrainLimits:
     """
 
     def __init__(self, parameters: Powertrain) -> None:
-        """Take limits and fractions from the parameters."""
+        """Copy limits and fractions from the parameters."""
         self.fractions = parameters.wheel_fractions
         self.numbers = (
             parameters.max_torque_Nm,
@@ -417,5 +417,5 @@ class PowertrainLimits:
         return engine_speed(self.fractions, wheel_speeds_radps)
 
     def limits_Nm(self, speed_radps: float, gear: int) -> tuple[float, float]:
-        """Return the least and the greatest torque at all wheels together, forward positive [N m]."""
+        """Return the torque limits at all wheels together, forward positive [N m]."""
         return _limits_Nm(speed_radps, gear, self.numbers)

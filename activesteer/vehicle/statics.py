@@ -1,4 +1,4 @@
-"""The car at rest: static ride, mass properties, load, and its position on the road."""
+"""The car at rest: static equilibrium, mass properties, load, and position on the road."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def move_by(model: mujoco.MjModel, data: mujoco.MjData, dofs: list[int] | NDArra
 def slopes(
     model: mujoco.MjModel, data: mujoco.MjData, dofs: Iterable[int], present: Array, value: Callable[[], Array]
 ) -> Array:
-    """Return the change of a vector along each degree of freedom by finite differences, shape (present, dofs)."""
+    """Return finite differences of a vector by each degree of freedom, shape (present, dofs)."""
     start, columns = data.qpos.copy(), []
     for dof in dofs:
         move_by(model, data, [dof], _DIFFERENCE)
@@ -84,13 +84,13 @@ def slopes(
 
 
 def _residual(model: mujoco.MjModel, data: mujoco.MjData, free: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the generalised force that is not balanced, at rest, shape (free.size,)."""
+    """Return the unbalanced generalised force at rest, shape (free.size,)."""
     mujoco.mj_forward(model, data)
     return data.qfrc_smooth[free].copy()
 
 
 class MassProperties(NamedTuple):
-    """Mass, centre of gravity in the world frame, shape (3,), and inertia tensor about it, world axes, shape (3, 3)."""
+    """Mass, centre of gravity and inertia tensor, in world axes."""
 
     mass_kg: float
     cg_m: Array
@@ -118,7 +118,7 @@ def mass_properties(
 
 
 def point_mass_inertia(offset_m: Array) -> Array:
-    """Return the inertia tensor, per mass, of a point mass at a distance `offset_m` from a point [m2] (Steiner)."""
+    """Return the inertia tensor of a point mass, per mass [m2] (Steiner)."""
     return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
 
 
@@ -127,7 +127,7 @@ YAW_DOF: Final = 5
 
 
 def turn_chassis_back(data: mujoco.MjData, half_rad: float) -> None:
-    """Turn orientation and velocity of the chassis about the world's z axis at its position."""
+    """Rotate orientation and velocity of the chassis about the vertical axis at its position."""
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, np.array([math.cos(half_rad), 0.0, 0.0, -math.sin(half_rad)]), data.qpos[3:7])
     data.qpos[3:7] = turned

@@ -1,4 +1,4 @@
-"""Addresses and indices that the native step needs, its rows, and the wheels and actuators in the engine."""
+"""Bindings of the native step: addresses and indices, rows, wheels and actuators."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ TAPE: Final = numbers_type(words=("room", "row", "row_bytes", "rows", "pose_ever
 
 
 class Tape:
-    """Memory for recorded steps. It owns the memory of its `TAPE` record, shape (1,).
+    """Memory for recorded steps, which a `TAPE` record points to.
 
     `room`: rows that still fit. `row`, `row_bytes`: address and size of the next row. `rows`, `pose_every`: rows
     recorded so far, and rows between two poses. `position`, `quaternion`: addresses of the next poses.
@@ -134,13 +134,13 @@ def bind_step(
 
 
 def record_from(bindings: NDArray[Any], recorded: RawRows) -> None:
-    """Bind the arrays that rows are copied from."""
+    """Bind the arrays that a row copies."""
     bindings["sources"] = [array.ctypes.data for array in recorded]
     bindings["sizes"] = [array.size for array in recorded]
 
 
 def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
-    """Bind the sensors between the truth and the measurement."""
+    """Bind the sensors between the true values and the measurement."""
     bindings["n_sensors"] = 0
     if sensors is not None:
         bindings["n_sensors"], bindings["sensors"] = len(sensors.chains), sensors.chains.ctypes.data
@@ -158,7 +158,7 @@ def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
 
 
 def command_channels(numbers: Mapping[str, Number]) -> dict[Channel, int]:
-    """Places of the recorded numbers in a row, by channel."""
+    """Indices of the recorded numbers in a row, by channel."""
     return {
         Channel(name, number.recorded.unit, number.recorded.meaning, "control"): place
         for place, (name, number) in enumerate(numbers.items())
@@ -208,7 +208,7 @@ _WRITERS: Final[dict[type[Any], tuple[Any, str, int]]] = {
 
 
 def write_command(kind: type[Any], address: int, command: Any) -> None:
-    """Write the numbers of a command that comes from Python."""
+    """Write the numbers of a command from Python."""
     write, key, count = _WRITERS[kind]
     # Native code reads a fixed number of fields; an incomplete message would end the process.
     if type(command) is not kind or len(command) != count:
@@ -226,12 +226,12 @@ def write_commands(row: Array, driver_command: Any, actuator_command: Any) -> No
 
 
 def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
-    """The engine's arrays, by the names that the engine and `RawRows` share."""
+    """Arrays of the engine, under the names of `RawRows`."""
     return {name: getattr(data, name) for name in ENGINE_ARRAYS}
 
 
 class RecordedArrays:
-    """The engine's arrays, last commands, measurement, states of brakes and motors, and an estimate if recorded."""
+    """Arrays of a row: engine, commands, measurement, brakes, motors, and an estimate if recorded."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, measured: Array, brakes: Array, electric: Array
@@ -243,18 +243,18 @@ class RecordedArrays:
         self.estimate: Array = np.empty(0)
 
     def live(self) -> RawRows:
-        """Return the arrays themselves, in the order of a row."""
+        """Return the arrays in the order of a row."""
         return self._of(self._data, self.commands)
 
     def empty(self, count: int) -> RawRows:
-        """Allocate rows for `count` steps in one block, as `Vehicle.step` fills them."""
+        """Allocate rows for several steps in one block."""
         live = self.live()
         ends = np.cumsum([array.size for array in live])
         block = np.empty((count, ends[-1]))
         return RawRows(*(block[:, end - array.size : end] for array, end in zip(live, ends, strict=True)))
 
     def present(self, driver_command: DriverCommand, actuator_command: ActuatorCommand) -> RawRows:
-        """Return one row as a step fills it, for the current time and inputs, without any change."""
+        """Return one row for the current time and inputs."""
         now, commands = mujoco.MjData(self._model), np.empty_like(self.commands)
         mujoco.mj_copyData(now, self._model, self._data)
         mujoco.mj_forward(self._model, now)
@@ -331,7 +331,7 @@ class WheelSet:
         self._ctrl[self.bound["drives"]], self._ctrl[self.bound["brakes"]] = numbers[:4], numbers[4:]
 
     def heights_m(self) -> Array:
-        """Return the heights of the wheels' centres, shape (4,) [m]: roughly their rolling radii."""
+        """Return the heights of the wheel centres [m], approximately the rolling radii."""
         return self._data.xpos[self._bodies, 2]
 
     def effective_radii_m(self, tyres: tuple[TyreParameters, TyreParameters]) -> list[float]:
@@ -344,14 +344,14 @@ class WheelSet:
         ]
 
     def inertias_kgm2(self) -> list[float]:
-        """Return the inertia of each wheel with everything that turns with it."""
+        """Return the inertia of each wheel and of the parts that rotate with it."""
         mass_matrix = np.zeros((self._model.nv, self._model.nv))
         mujoco.mj_fullM(self._model, self._data, mass_matrix)
         return mass_matrix.diagonal()[self.spins].tolist()
 
 
 def torque_numbers(torques: WheelTorques) -> tuple[float, ...]:
-    """Return the drive torques and the brake torques of the wheels [N m]."""
+    """Return the drive and brake torques of the wheels [N m]."""
     try:
         numbers = (*map(float, torques.drive_Nm), *map(float, torques.brake_Nm))
     except (AttributeError, TypeError, ValueError) as reason:
@@ -376,7 +376,7 @@ class ActuatorRecords:
         return self._actuators[actuator : actuator + 1]
 
     def screw(self, actuator: int) -> tuple[NDArray[Any], ...]:
-        """Return the records of link and screw of an actuator, only its motor without a link, or nothing."""
+        """Return the records of link and screw of an actuator, empty without a screw."""
         record = self.of(actuator)
         place = int(record["record"][0])
         if record["kind"] == fb.KIND_SCREW:
@@ -395,7 +395,7 @@ class ActuatorRecords:
                 yield records
 
     def rear_states_at(self, angle_rad: float) -> dict[int, float]:
-        """Return activations of the rear steering actuators at rest at an angle [rad], by their addresses."""
+        """Return the activations of the rear steering actuators at rest at an angle, by address."""
         states: dict[int, float] = {}
         for actuator in self._rear:
             address = int(self._model.actuator_actadr[actuator])
@@ -418,7 +418,7 @@ class SteeringRates(NamedTuple):
 
 
 def steering_rates(model: mujoco.MjModel, parameters: VehicleParameters) -> SteeringRates:
-    """Return the rates of the actuators without load, near the middle of their travel."""
+    """Return the unloaded rates of the actuators, near the middle of their travel."""
     rear, superposition = parameters.rear_actuator, parameters.superposition_actuator
     present = {model.actuator(index).name for index in range(model.nu)}
     front_radps = rear_radps = math.inf

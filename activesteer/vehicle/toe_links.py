@@ -1,4 +1,4 @@
-"""Toe links with screws: the steer angle over the length of a link, and the changes of the model for its screws.
+"""Toe links with screws: steer angle versus link length, and the screws in the model.
 
 The chassis is fixed, and the damper and all other links keep their lengths. For each length of the toe link, Newton's
 method finds the position of the corner in which no link carries a force.
@@ -43,7 +43,7 @@ _FIT: Final = 2e-3
 
 
 class ToeLinkMap(NamedTuple):
-    """Change of length of a toe link over its steer angle, and back, as coefficients of polynomials, shape (DEGREE,).
+    """Polynomials between the change of length of a toe link and its steer angle, in both directions.
 
     `travel_m` is the largest change of length within the limit, to either side.
     """
@@ -59,7 +59,7 @@ def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float)
 
 
 def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float) -> ToeLinkMap:
-    """Solve the map of a corner."""
+    """Compute the map of a corner."""
     solver = _Corner(model, corner, link)
     slope = (solver.angle(1e-4) - solver.angle(-1e-4)) / 2e-4
     if abs(slope) < 0.5:
@@ -94,7 +94,7 @@ def _fit(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class _Corner:
-    """The coordinates of a corner and the lengths that constrain them."""
+    """Coordinates of a corner, and the link lengths that constrain them."""
 
     def __init__(self, model: mujoco.MjModel, corner: str, link: str) -> None:
         self._model, self._data = model, mujoco.MjData(model)
@@ -134,7 +134,7 @@ class _Corner:
         return missing
 
     def angles(self, travels_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the steer angles at several lengths [rad], by searches from the previous solution."""
+        """Return the steer angles at several lengths [rad], each searched from the previous one."""
         middle = len(travels_m) // 2
         outwards = [self._along(travels_m[middle:]), self._along(travels_m[middle::-1])]
         return np.concatenate([outwards[1][:0:-1], outwards[0]])
@@ -168,7 +168,7 @@ SCREW: Final = "_screw"
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:
-    """Replace the hinges of a model by actuators along its rear toe links."""
+    """Replace the steering hinges of a model by actuators in its rear toe links."""
     spec.nuserdata += len(CORNERS)
     for key in list(spec.keys):
         spec.delete(key)  # made for a car with hinges
@@ -210,7 +210,7 @@ def _add(spec: mujoco.MjSpec, name: str, tendon: str, gain: float, actuator: Rea
 
 
 def toe_link_of(spec: Any, corner: str) -> Any:
-    """Return the tendon that is the toe link of a rear corner."""
+    """Return the toe link tendon of a rear corner."""
     for name in LINKS:
         if (tendon := spec.tendon(f"{corner}_{name}")) is not None:
             return tendon
@@ -221,7 +221,7 @@ def toe_link_of(spec: Any, corner: str) -> Any:
 def screw_records(
     model: mujoco.MjModel, actuator: RearActuator
 ) -> tuple[list[NDArray[Any]], list[NDArray[Any]], dict[str, tuple[float, int]]]:
-    """Return the `LINK` and `SCREW` records, and kind and place of the record of each actuator."""
+    """Return the `LINK` and `SCREW` records, and the kind and index of each actuator's record."""
     limit = known(actuator.limit_rad)
     names = [_tendon(model, corner) for corner in CORNERS]
     left = toe_link_map(model, "rl", names[0], limit)

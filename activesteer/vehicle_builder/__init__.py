@@ -1,4 +1,4 @@
-"""A user's own car: made from a table of hardpoints, and checked before it is driven.
+"""A user's own car: built from a table of hardpoints, and checked before the first run.
 
 In: a table of hardpoints or of K&C curves.
 Out: a vehicle folder, and findings about it.

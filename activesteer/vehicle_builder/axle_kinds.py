@@ -24,7 +24,7 @@ from activesteer.errors import ParameterError, nearest_names
 
 @dataclass(frozen=True)
 class LinkKind:
-    """One link between chassis (or rack) and knuckle of the left side, with its elasticity."""
+    """Link between chassis (or rack) and knuckle of the left side, with its elasticity."""
 
     name: str
     inner: str  # point on the chassis, or on the rack
@@ -59,13 +59,13 @@ class AxleKind:
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """All points that a table must give, in the order of the messages."""
+        """All required points of the axle, in the order of the messages."""
         ends = [point for link in self.links for point in (link.inner, link.outer)]
         return tuple(dict.fromkeys((*self.points, *ends)))
 
     @property
     def arms(self) -> dict[str, tuple[Sequence[str], str]]:
-        """Swinging parts by name, each with its inner points (one or two) and its outer point."""
+        """Arms by name, each with its inner points (one or two) and its outer point."""
         arms = {}
         for name, inner in self.carriers.items():
             if inner:
@@ -139,7 +139,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
 
 
 def _lever(inner: list[Array], outer: Array, foot: Array, along: Array) -> float:
-    """Return the shortening of a spring per travel of the arm's outer joint along it, at the design position."""
+    """Return the shortening of a spring per travel of the arm's outer joint, at the design position."""
     base = inner[0]
     if len(inner) == 1:
         rod = outer - base

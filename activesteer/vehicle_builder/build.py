@@ -1,4 +1,4 @@
-"""Build a car from its table, step by step."""
+"""Build of a car from its table."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def keyframe_xml(vehicle: FileOrTable) -> tuple[str, Path]:
 
 @dataclass(frozen=True)
 class NewVehicle:
-    """A new car: its files, and the values that were assumed or adjusted.
+    """A new car: its files, and its assumed or adjusted values.
 
     Attributes:
         folder: Folder of its files.
@@ -72,7 +72,7 @@ def new_vehicle(
     kc: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
 ) -> NewVehicle:
-    """Create a car from a table of hardpoints, masses, springs and bushings, or from measurements of a K&C rig.
+    """Create a car from a table, or from measurements of a K&C rig.
 
     Examples:
         >>> from activesteer.resources import models_dir
@@ -128,7 +128,7 @@ def new_vehicle(
 
 
 def _install(files: Path, target: Path) -> None:
-    """Copy files into a folder that appears only when it is complete, so that a full disk leaves no files."""
+    """Copy files to a folder that appears only when it is complete, so that a full disk leaves no files."""
     part = target.with_name(f".{target.name}-{secrets.token_hex(4)}.part")
     with writing(target, ParameterError):
         try:
@@ -154,7 +154,7 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
 
 
 def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
-    """Drive the standing car, and write its two-track properties, or return why that is impossible."""
+    """Drive the standing car and write its two-track properties, or return the reason of a failure."""
     file = folder / f"{car.name}.toml"
     try:
         found = two_track_of(file, run_scenario)
@@ -165,7 +165,7 @@ def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
 
 
 def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = False) -> Path:
-    """Write MJCF and vehicle file, the final one with the single-track model of the car itself."""
+    """Write MJCF and vehicle file. The final vehicle file has the single-track model of the car."""
     for name, text in mjcf_files(car, trimmed).items():
         (folder / name).write_text(text, encoding="utf-8")
     model = compiled_model(folder / f"{car.name}.xml") if final else None
@@ -175,7 +175,7 @@ def _write(folder: Path, car: CarDesign, trimmed: Trimmed, *, final: bool = Fals
 
 
 def _tyre(axle: str, table: CarTable, beside: Path, log: Log) -> tuple[str, TyreParameters, Path | None]:
-    """Return name and parameters of an axle's tyre file, and the file to copy into the folder of the car."""
+    """Return name and parameters of an axle's tyre file, and the file to copy."""
     name = table.axle(axle).tyre
     if name is None:
         log.note(f"{axle}.tyre", DEFAULT_TYRE, "the compact's")

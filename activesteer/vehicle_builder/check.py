@@ -1,4 +1,4 @@
-"""Check of a car before it is driven, in stages: a stage that fails gives its reason.
+"""Check of a car before the first run, in stages. A stage that fails gives its reason.
 
 A finding is one line of the report, with the value, the usual range from usual.toml, and advice.
 """
@@ -38,7 +38,7 @@ _WRAPPED: Final = textwrap.TextWrapper(80, subsequent_indent=11 * " ", break_lon
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the report.
+    """Line of the report.
 
     Attributes:
         topic: parts, geometry, standing, riding, kinematics, steering, tyres.
@@ -58,7 +58,7 @@ class Finding:
 
 
 def checked(topic: str, what: str, good: bool, value: str, advice: str) -> Finding:
-    """Return the finding about a property that a car must have, with advice if it is missing."""
+    """Return the finding about a required property, with advice if it is missing."""
     return Finding(topic, what, "ok" if good else "error", value, "", "" if good else advice)
 
 
@@ -92,7 +92,7 @@ class CheckReport:
         }
 
     def table(self) -> str:
-        """Return the report as text, with advice below warnings and errors."""
+        """Return the report as lines, with advice below warnings and errors."""
         lines, topic = [], ""
         for finding in self.findings:
             if finding.topic != topic:
@@ -108,7 +108,7 @@ class CheckReport:
 
 @dataclass(frozen=True)
 class Usual:
-    """Usual and possible range of a value, with the keys of a table in usual.toml, which has the sources."""
+    """Usual and possible ranges of a value, from a table in usual.toml."""
 
     topic: str
     words: str  # name in the report
@@ -202,7 +202,7 @@ def _metrics(result: KcResult, topic: str) -> Iterator[Finding]:
 
 
 def _sign(result: KcResult) -> Finding:
-    """Check that turning the steering wheel to the left turns both wheels to the left."""
+    """Check that both wheels turn left when the steering wheel does."""
     sweep = result.curves["steering_rolling"]
     turned = sweep.steer_rad[-1, :2] - sweep.steer_rad[sweep.zero, :2]
     good = bool((turned > 0.0).all()) and float(sweep.x[-1]) > 0.0
@@ -381,7 +381,7 @@ _NEEDED: Final = {
 
 
 def missing_parts(model: mujoco.MjModel) -> Iterator[Finding]:
-    """Return one error for each missing part, or one line if none is missing."""
+    """Return an error for each missing part, or one line if nothing is missing."""
     complete = True
     for word, count in _COUNTS.items():
         there = [getattr(model, word)(index).name for index in range(getattr(model, count))]

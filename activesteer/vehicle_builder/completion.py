@@ -1,4 +1,4 @@
-"""Completion of a car: values that its table leaves open follow from published proportions.
+"""Completion of a car with values from published proportions.
 
 The engine's step is implicit in the stiffness of tendons, so the bushings are tendons along the slides, like all other
 springs of a car.
@@ -26,14 +26,14 @@ from activesteer.vehicle_builder.table import AxleTable, CarTable, LinkTable, To
 
 
 def rack_sign(front: Axle) -> float:
-    """Return the sign of the rack's y when the left wheel steers left, by default for tie rods behind the axle."""
+    """Return the sign of the rack's y for steering to the left."""
     if front.kind.guided:
         return -1.0
     return math.copysign(1.0, _rack_per_steer(front))
 
 
 def _rack_per_steer(front: Axle) -> float:
-    """Return the rack travel to the left per steer angle of the left wheel, rigid links [m/rad]."""
+    """Return the rack travel to the left per steer angle of the left wheel, for rigid links [m/rad]."""
     # The steering axis without elasticity.
     lower, upper = front.points["lca_outer"], front.points["strut_top" if front.kind.strut else "uca_outer"]
     inner, outer = front.points["tie_rod_inner"], front.points["tie_rod_outer"]
@@ -55,7 +55,7 @@ def _rack_per_steer(front: Axle) -> float:
 
 
 def rack_per_steer_m(front: Axle) -> float:
-    """Return the rack travel per steer angle about straight ahead, positive, rigid links [m/rad]."""
+    """Return the magnitude of the rack travel per steer angle about straight ahead, for rigid links [m/rad]."""
     if front.measured is not None:
         rack, steer = front.measured.curves.rack_m, front.measured.curves.rack_steer_rad
         near = np.argsort(np.abs(rack))[:5]
@@ -64,7 +64,7 @@ def rack_per_steer_m(front: Axle) -> float:
 
 
 def rack_limit_m(front: Axle) -> float:
-    """Return the travel of the rack to its stops: the measured range, or 36 deg of steer angle [m]."""
+    """Return the travel of the rack to its stops [m]."""
     if front.measured is not None:
         return min(-front.measured.curves.rack_m[0], front.measured.curves.rack_m[-1])
     return round(0.92 * rack_per_steer_m(front) * math.sin(math.radians(36.0)), 4)
@@ -81,7 +81,7 @@ _BELOW_MOUNT_M = 0.07
 def top_mount(
     axle: str, table: TopMountTable | None, kind: AxleKind, points: dict[str, Array], damper: Mount, log: Log
 ) -> TopMount | None:
-    """Complete the top mount of an axle, or None if it is rigid."""
+    """Complete the top mount of an axle, or return None for a rigid one."""
     if table is None and not kind.strut:
         return None
     key, table = f"{axle}.top_mount", table or TopMountTable()
@@ -140,7 +140,7 @@ def complete(
     log: Log,
     tables: KcTables | None = None,
 ) -> CarDesign:
-    """Create a car from a table in vehicle coordinates."""
+    """Complete a car from its table."""
     steering, brakes = table.steering, table.brakes
     column_Npm = log.take("steering", steering, "column_stiffness_Npm", 4e6, "the compact's: torsion bar and assist")
     servo_Nmprad = table.rear_steering.stiffness_Nmprad or _SERVO_NMPRAD
@@ -189,7 +189,7 @@ def complete(
 
 
 def pedal_of(motors: Motors) -> Powertrain:
-    """Return a powertrain whose pedal demands the full torque of the motors."""
+    """Return a powertrain that demands the full torque of the motors at full pedal."""
     front_Nm, rear_Nm = (sum(motor.wheel_torque_Nm for motor in motors.on(axle)) for axle in ("front", "rear"))
     return Powertrain(
         front_fraction=round(front_Nm / (front_Nm + rear_Nm), 3),
@@ -299,7 +299,7 @@ def _solid(
     where: str,
     log: Log,
 ) -> Solid:
-    """Return the mass properties of one part, with a missing inertia in proportion to the mass."""
+    """Return the mass properties of one part, with inertia in proportion to mass if missing."""
     key = f"{axle}.{part}"
     cg, inertia = (getattr(table, f"{part}_{name}") for name in ("cg", "inertia_kgm2"))
     kg = log.take(axle, table, f"{part}_mass_kg", default_kg, "a part of this kind in the compact's class")

@@ -1,4 +1,4 @@
-"""Motion of a corner: at the design position to first order, and from there to the standing car."""
+"""Motion of a corner about the design position, and from there to the standing car."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def wheel_travel_m(vehicle: Vehicle) -> Array:
 
 
 def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float], float]:
-    """Return the shortening of each tendon per wheel travel in bump, with rigid links, and the firmness.
+    """Return the shortening of each tendon per wheel travel, for rigid links, and the firmness.
 
     The firmness is the smallest singular value of the directions of the links: 0 if two links constrain the same
     direction, 0.05 to 0.5 in cars. Chassis and rack are held, and springs are left out.

@@ -1,4 +1,4 @@
-"""A complete car: values from its table, and assumed values, which are logged."""
+"""A complete car: values from its table, and assumed values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from activesteer.vehicle_builder.table import AxleTable, CarTable
 
 @dataclass(frozen=True)
 class Assumption:
-    """An assumption: a value that the table does not give."""
+    """Assumption: a value that the table does not give."""
 
     key: str
     value: str
@@ -36,7 +36,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class Solid:
-    """Mass, centre of gravity and inertia about it in vehicle axes [kg, m, kg m2]."""
+    """Mass properties in vehicle axes [kg, m, kg m2]."""
 
     mass_kg: float
     cg_m: Array
@@ -45,7 +45,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class TopMount:
-    """The top mount of a strut or damper: slide `z` along the axis of the left side, a strut also `x`, `y`."""
+    """Top mount of a strut or damper in the frame of the left side."""
 
     directions: dict[str, Array]  # unit vector of each slide, vehicle axes: upwards, forward, to the left
     stiffness_Npm: dict[str, float]
@@ -135,26 +135,26 @@ class CarDesign:
 
 
 class Log:
-    """Collector of the assumptions."""
+    """Log of assumptions."""
 
     def __init__(self) -> None:
         self.assumptions: list[Assumption] = []
 
     def take(self, path: str, part: Any, name: str, default: float, rule: str) -> float:
-        """Return a value of a part of the table, or the default, which is logged as an assumption."""
+        """Return a value from the table, or the default with an entry in the log."""
         if (given := getattr(part, name)) is not None:
             return given
         self.note(f"{path}.{name}" if path else name, f"{default:.4g} {unit_of(name)}".strip(), rule)
         return default
 
     def angle(self, key: str, given_rad: float | None, default_deg: float, rule: str) -> float:
-        """Return the given angle, or the default in degrees, which is logged as an assumption [rad]."""
+        """Return an angle from the table, or the default with an entry in the log [rad]."""
         if given_rad is None:
             self.note(key, f"{default_deg:g} deg", rule)
         return math.radians(default_deg) if given_rad is None else given_rad
 
     def note(self, key: str, value: str, rule: str) -> None:
-        """Add an assumption to the log."""
+        """Add an assumption."""
         self.assumptions.append(Assumption(key, value, rule))
 
 
@@ -217,7 +217,7 @@ _DIGITS: Final = 7
 
 
 def hardware_tables(part: Any) -> dict[str, Any]:
-    """Return the non-empty tables of actuators, motors, battery and sensors of a car."""
+    """Return the given tables of actuators, motors, battery and sensors."""
     tables = {
         "rear_actuator": to_table(part.rear_actuator or RearActuator(), defaults=False),
         "superposition_actuator": to_table(part.superposition_actuator or SuperpositionActuator(), defaults=False),

@@ -43,7 +43,7 @@ _FIRST_SPRINGS: Final = np.array([1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, -0.5, 
 
 @dataclass(frozen=True)
 class Load:
-    """One test of compliance on the left wheel."""
+    """One compliance test of the left wheel."""
 
     name: str
     direction: Array  # load at the wheel centre per unit of x: forces along x and y, moments about x, y and z
@@ -55,7 +55,7 @@ class Load:
 
 
 def fitted(loads: list[Load]) -> tuple[dict[str, tuple[float, ...]], str]:
-    """Fit stiffness and hardening about the curves to the measured compliance: fields of `AxleCurves`, and a remark.
+    """Fit stiffness and hardening to the measured compliance, and return them with a remark.
 
     Directions that are rigid in the tests, as most are in an axle with few soft bushings, keep a small compliance: a
     wheel oscillates on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
@@ -104,7 +104,7 @@ def fitted(loads: list[Load]) -> tuple[dict[str, tuple[float, ...]], str]:
 
 
 def _start(forces: Array, wanted: Array, weight: Array) -> Array:
-    """Return the triangle of the nearest compliance by linear least squares, made positive definite."""
+    """Return the nearest positive definite compliance, by least squares, as a triangle."""
     places, rows, right = list(zip(*_LOWER, strict=True)), [], []
     for index in range(5):
         known = np.isfinite(wanted[:, index])
@@ -130,7 +130,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion, shape (n, 5), without the compliance in series, or nan if not measured."""
+    """Return the motion without the compliance in series, shape (n, 5), nan if not measured."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 
@@ -161,7 +161,7 @@ _DIGITS: Final = 7
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """Measurements of an axle, for one wheel, None for what was not measured."""
+    """Measurements of an axle for one wheel, None for missing measurements."""
 
     curves: AxleCurves  # measured curves, and the stiffness
     wheel_load_N: tuple[float, ...] | None  # over `curves.travel_m`, relative to the standing car
@@ -176,7 +176,7 @@ class MeasuredAxle:
 
     @property
     def wheel_rate_Npm(self) -> float | None:
-        """Slope of the wheel load about the standing car."""
+        """Slope of the wheel load at the standing car."""
         if self.wheel_load_N is None:
             return None
         travel = np.array(self.curves.travel_m)
@@ -234,7 +234,7 @@ def _curve(samples: Samples, values: Array | None, at: Array, name: str, rough: 
 
 
 def _wheel_paths(samples: Samples, radius_m: float) -> tuple[Array | None, Array | None]:
-    """Return the path of the wheel centre outwards and forwards, by default from the path of the contact point."""
+    """Return the lateral and longitudinal path of the wheel centre."""
     outwards, forward = samples.moved("centre_outwards"), samples.moved("centre_forward")
     contact = samples.moved("contact_outwards")
     if outwards is None and contact is not None:
@@ -297,7 +297,7 @@ def _over_rack(
 
 
 def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Array) -> list[Load]:
-    """Return the tests of compliance: load at the wheel centre per unit of the variable, and motion."""
+    """Return the compliance tests: load at the wheel centre per unit of the variable, and motion."""
     camber = tests["parallel_travel"]
     # The contact point of a cambered wheel is not below its centre.
     beside_m = -radius_m * float(np.sin(smoothed(camber.x, camber.channels["camber"], np.zeros(1))[0]))
@@ -329,7 +329,7 @@ def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Arr
 
 
 def _rack_compliance(curves: AxleCurves, column_Npm: float) -> Array:
-    """Return the compliance of a wheel by the steering column, with both wheels loaded alike, shape (5, 5)."""
+    """Return the compliance of a wheel by the steering column, with equal loads on both wheels, shape (5, 5)."""
     rack, over = np.array(curves.rack_m), curves.over_rack()
     near = np.argsort(np.abs(rack))[:5]
     slopes = np.array([np.polyfit(rack[near], row[near], 1)[0] for row in over])
@@ -355,7 +355,7 @@ def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | N
 
 
 def _rack_lift(tests: dict[str, Samples]) -> float:
-    """Return the rack lift from the change of wheel load in steering, or 0 if not measured."""
+    """Return the rack lift from the change of wheel load over steering, 0 if not measured."""
     steered, opposite = tests.get("steering"), tests.get("opposite_travel")
     if steered is None or opposite is None:
         return 0.0

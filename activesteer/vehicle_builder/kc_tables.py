@@ -59,14 +59,14 @@ class Samples:
     file: str
 
     def moved(self, name: str) -> Array | None:
-        """Return a channel less its value at x = 0, which need not be a sample, or None if not measured."""
+        """Return a channel relative to x = 0, None if not measured."""
         if name not in self.channels:
             return None
         return self.channels[name] - smoothed(self.x, self.channels[name], np.zeros(1))
 
 
 def smoothed(x: Array, y: Array, at: Array) -> Array:
-    """Evaluate a least-squares cubic spline through samples, with both branches of a loop.
+    """Fit a least-squares cubic spline to samples, including both branches of a loop.
 
     Knots are evenly spaced, at most one for two different positions, so that noise and hysteresis are averaged.
     """
@@ -129,7 +129,7 @@ def _check_files(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class _Names:
-    """Tables of the file names.toml of a folder."""
+    """Content of the file names.toml of a folder."""
 
     names: dict[str, str] = field(default_factory=dict)
     signs: dict[str, float] = field(default_factory=dict)
@@ -150,7 +150,7 @@ def _translation(folder: Path) -> _Names:
 
 
 def _columns(file: Path, names: _Names) -> dict[str, Array]:
-    """Return channels (with side) to values in SI units and our signs."""
+    """Return the channels of a file in SI units, with the signs of this package."""
     columns: dict[str, Array] = {}
     for head, values in _raw_columns(file).items():
         channel, factor = _channel(file, head, names.names.get(head, head))
@@ -232,7 +232,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
 
 
 def _complete_rack(columns: dict[str, Array], file: Path) -> float | None:
-    """Return the rack travel per steering wheel angle, by definition 7.5 mm/rad if the file has no rack."""
+    """Return the rack travel per steering wheel angle, 7.5 mm/rad if the file has no rack."""
     if "steering_wheel" not in columns:
         if "rack" not in columns:
             raise ParameterError("neither rack nor steering_wheel was measured", file=file.name)
@@ -327,6 +327,6 @@ def _slope(name: str, samples: Samples, channel: str) -> float | None:
 
 
 def _least(name: str, channel: str, samples: Samples) -> float:
-    """Smallest slope that counts: 0.02 mm or 0.002 deg, or 10 N, over the evaluated range."""
+    """Smallest significant slope over the evaluated range: 0.02 mm, 0.002 deg or 10 N."""
     step = 10.0 if channel == "load" else 3e-5 if channel.endswith("toe") else 2e-5
     return step / min(_NEAR[TESTS[name].variable], float(np.abs(samples.x).max()))

@@ -1,4 +1,4 @@
-"""The table of a new car, and its checks.
+"""The table of a new car, with its checks.
 
 In a CSV file a row is a dotted key and its values: `front.wheel_centre, 0, 762.5, 297.2` is the point `wheel_centre` of
 [front.points], `mass.total_kg, 1430` the key `total_kg` of [mass]. `#` begins a comment.
@@ -143,7 +143,7 @@ class AxleTable:
 
 @dataclass(frozen=True)
 class MassTable:
-    """Masses of the whole car at rest with driver, or of only the chassis."""
+    """Masses of the whole car with driver, or of the chassis only."""
 
     total_kg: Positive | None = None
     """Mass of the whole car [kg]."""
@@ -181,7 +181,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class RearSteeringTable:
-    """The hinge between rear knuckle and carrier, which every car has, even without rear steering."""
+    """Hinge between rear knuckle and carrier, required also in a car without rear steering."""
 
     axis_lower: Point | None = None
     """A point of the steering axis on the left side, in the table's units."""
@@ -286,7 +286,7 @@ def chosen_kinds(table: CarTable, front: str | None = None, rear: str | None = N
 
 
 def in_vehicle_axes(table: CarTable) -> CarTable:
-    """Return the table with all points in metres and vehicle coordinates, origin on the road below the front axle."""
+    """Return the table with all points in metres and vehicle coordinates."""
     factor = known_unit(table.units).factor
 
     def moved(point: Point) -> Point:

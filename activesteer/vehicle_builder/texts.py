@@ -1,4 +1,4 @@
-"""Text files of a built car: MJCF, vehicle file, README, and the table of a measured car.
+"""Generated files of a built car: MJCF, vehicle file, README, and table of a measured car.
 
 With the table, `activesteer vehicle new NAME --kc DIR` makes the same car again, with curves instead of links.
 """
@@ -37,7 +37,7 @@ _TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
 def vehicle_text(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None = None
 ) -> str:
-    """Return the text of the vehicle file."""
+    """Return the content of the vehicle file."""
     remarks, _ = read_toml(_TEMPLATES / "remarks.toml")
     remarks |= {
         "steering": f"Ratio at the centre without load; lock: the rack stops at {1e3 * car.rack_limit_m:.1f} mm.",
@@ -55,7 +55,7 @@ def vehicle_text(
 def _table(
     car: CarDesign, trimmed: Trimmed, model: mujoco.MjModel | None, two_track: TwoTrackParameters | None
 ) -> dict[str, Any]:
-    """Return the vehicle file as a table, with all keys of tables in the form of a vehicle file."""
+    """Return the vehicle file as a table."""
     compact, _ = read_toml(find_vehicle("compact"))
     lines = two_track_lines(two_track) if two_track is not None else {}
     limit_rad = 0.99 * car.rack_limit_m / trimmed.pinion_radius_m
@@ -92,14 +92,14 @@ def _table(
 
 
 def _curves(car: CarDesign, trimmed: Trimmed) -> dict[str, Any]:
-    """Return the tables [curves.front] and [curves.rear], angles in degrees, or nothing for axles of links."""
+    """Return the tables [curves.front] and [curves.rear], empty for axles of links."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}
 
 
 def _single_track(car: CarDesign, model: mujoco.MjModel | None) -> dict[str, float]:
-    """Return the single-track model estimated from the tyres, with a characteristic speed of 50 to 300 km/h."""
+    """Return the single-track model estimated from the tyres."""
     base = car.wheelbase_m
     mass, inertia, to_front, stiffness = 1500.0, 2300.0, 0.45 * base, {"front": 1e5, "rear": 1.5e5}
     if model is not None:
@@ -127,7 +127,7 @@ def _single_track(car: CarDesign, model: mujoco.MjModel | None) -> dict[str, flo
 
 
 def num(value: float, digits: int = 6) -> str:
-    """Return a number with at most `digits` decimals, without trailing zeros."""
+    """Format a number with at most `digits` decimals, without trailing zeros."""
     text = f"{float(value):.{digits}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
@@ -135,12 +135,12 @@ def num(value: float, digits: int = 6) -> str:
 
 
 def sig(value: float, digits: int = 6) -> str:
-    """Return a number with `digits` significant digits."""
+    """Format a number with `digits` significant digits."""
     return f"{float(value):.{digits}g}".replace("e+0", "e").replace("e+", "e")
 
 
 def vec(values: Iterable[float], digits: int = 6) -> str:
-    """Return numbers with at most `digits` decimals, separated by blanks as in MJCF."""
+    """Format numbers with at most `digits` decimals, separated by blanks as in MJCF."""
     return " ".join(num(value, digits) for value in values)
 
 
@@ -160,7 +160,7 @@ def _environment() -> Environment:
 
 
 def filled(template: str, **values: Any) -> str:
-    """Return the text of a template with these values."""
+    """Fill in a template."""
     return _environment().get_template(template).render(values)
 
 
@@ -173,12 +173,12 @@ class _Corner(NamedTuple):
     side: float  # 1 on the left, -1 on the right
 
     def at(self, point: Array) -> str:
-        """Return a point of the left side on this side."""
+        """Mirror a point of the left side to a side."""
         return vec((point[0], self.side * point[1], point[2]))
 
 
 def mjcf_files(car: CarDesign, trimmed: Trimmed) -> dict[str, str]:
-    """Return the files of the model as name to text, with an empty keyframe."""
+    """Return the contents of the model's files by name, with an empty keyframe."""
     front, corners = car.front, _corners(*car.axles)
     half_width_m = 0.5 * float(front.tyre_parameters["WIDTH"])
     main = {"car": car, "front": front, "corners": corners, "trimmed": trimmed, "half_width_m": half_width_m}
@@ -208,7 +208,7 @@ def _rack_joint(axle: Axle, lever: float) -> str:
 
 
 def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
-    """Return the text of front_axle.xml or rear_axle.xml."""
+    """Return the content of front_axle.xml or rear_axle.xml."""
     middle = axle.wheel_centre_m - np.array([0.0, 0.06, 0.0])
     drawn = [axle.points[point] for point in dict.fromkeys(link.outer for link in axle.links)]
     drawn = [point for point in drawn if np.linalg.norm(point - middle) > 0.01]
@@ -233,7 +233,7 @@ def _axle_file(car: CarDesign, axle: Axle, trimmed: Trimmed) -> str:
 
 
 def _in_design(axle: Axle, point: Array) -> Array:
-    """Return a point of the knuckle at zero joints, before curves turn it by the static angles."""
+    """Return a point of the knuckle at zero joint positions."""
     if axle.measured is None:
         return point
     curves = axle.measured.curves
@@ -244,7 +244,7 @@ def _in_design(axle: Axle, point: Array) -> Array:
 
 
 def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
-    """Return the text of README.md."""
+    """Return the content of README.md."""
     measured = [
         (axle, *max(axle.measured.roughness.items(), key=lambda item: item[1], default=("", 0.0)))
         for axle in car.axles
@@ -255,7 +255,7 @@ def readme_text(car: CarDesign, trimmed: Trimmed, table_name: str) -> str:
 
 
 def _damping_Nspm(trim: TrimmedAxle) -> float:
-    """Return the mean damping around rest."""
+    """Return the mean damping about zero velocity."""
     speeds, forces = trim.damper_velocity_mps, trim.damper_force_N
     at = next(index for index, speed in enumerate(speeds) if speed >= 0.0)
     first, last = max(at - 1, 0), min(at + 1, len(speeds) - 1)
@@ -273,7 +273,7 @@ _LEAST = 1e-4
 
 
 def car_table(car: CarSpec, result: KcResult) -> str:
-    """Return the text of the table of a measured car."""
+    """Return the content of the table of a measured car."""
     model, config = result.measured.vehicle.model, car.config
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

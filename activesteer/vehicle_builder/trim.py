@@ -1,4 +1,4 @@
-"""Adjustment of the standing car until height, weight, ride and steering match the table.
+"""Trim of the standing car to the height, weight, ride and steering of its table.
 
 A measured curve belongs to the loaded axle, the curve of the guide to the unloaded axle. They differ by a few
 hundredths of a degree, the effect of the wheel load at its small lever arms. The curves are corrected by the difference
@@ -59,7 +59,7 @@ class TrimmedAxle:
 
 @dataclass
 class Trimmed:
-    """Values that the trim has found."""
+    """Values found by the trim."""
 
     front: TrimmedAxle = field(default_factory=TrimmedAxle)
     rear: TrimmedAxle = field(default_factory=TrimmedAxle)
@@ -147,7 +147,7 @@ def _wheels(axle: Axle) -> list[int]:
 def _swept(
     held: HeldCar, cases: list[Case], order: Array, rack: Array | None = None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return poses (n, 4, 6) and loads (n, 4) of a sweep, from its middle outwards, and of the standing car.
+    """Return poses and loads of a sweep, and of the standing car.
 
     `rack` is filled with the travel of the rack [m].
     """
@@ -167,7 +167,7 @@ def _swept(
 
 
 def _poses(held: HeldCar) -> Array:
-    """Return forwards, left, camber, caster, toe, upwards of each wheel, shape (4, 6), with the signs of the rig."""
+    """Return the pose of each wheel in the coordinates of the rig, shape (4, 6)."""
     rows = []
     for corner in range(4):
         pose = held.wheel(corner)
@@ -181,7 +181,7 @@ def _poses(held: HeldCar) -> Array:
 
 
 def _left(poses: Array, corner: int) -> Array:
-    """Return the poses of a wheel as for the left wheel: outwards instead of left."""
+    """Mirror the poses of a wheel to the left side."""
     return poses * np.array([1.0, -INWARDS[corner], 1.0, 1.0, 1.0, 1.0])
 
 
@@ -230,7 +230,7 @@ class _Stand:
     camber_rad: Array
 
     def mount_m(self, corner: str) -> dict[str, float]:
-        """Return the displacement of a top mount in each of its directions [m]."""
+        """Return the displacement of a top mount along each of its slides [m]."""
         model, start = self.vehicle.model, f"{corner}_mount_"
         joints = [model.joint(index) for index in range(model.njnt) if model.joint(index).name.startswith(start)]
         qpos = self.held.data.qpos
@@ -238,7 +238,7 @@ class _Stand:
 
 
 def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
-    """Find all values of `Trimmed`, and write the files with them."""
+    """Find all values of `Trimmed`, and write the files of the car with them."""
     guided = tuple(axle for axle in car.axles if axle.measured is not None)
     trimmed = Trimmed(pinion_radius_m=car.table.steering.pinion_radius_m or rack_per_steer_m(car.front) / _RATIO)
     for axle in guided:
@@ -304,7 +304,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 
 def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
-    """Return the wheel rate, given or from the ride frequency, or None if the table gives the spring rate."""
+    """Return the wheel rate, None if the table gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:
@@ -382,7 +382,7 @@ def _let_stand(
     ratios: dict[str, tuple[float, float]],
     targets: dict[str, float | None],
 ) -> dict[str, float]:
-    """Let the car stand by Newton's method for each axle, and return the wheel rates."""
+    """Find the standing position by Newton's method for each axle, and return the wheel rates."""
     left_m = np.zeros(4)
     for _ in range(_ROUNDS):
         stand = _stand(write(trimmed))
@@ -423,7 +423,7 @@ def _let_stand(
 
 
 def _match_curves(car: CarDesign, guided: tuple[Axle, ...], trimmed: Trimmed, write: Write) -> None:
-    """Find curves that give the measured curves under load."""
+    """Find the curves of the unloaded axle that give the measured curves under load."""
     left = 0.0
     for _ in range(_MATCHES):
         held = _stand(write(trimmed)).held
@@ -439,7 +439,7 @@ def _match_curves(car: CarDesign, guided: tuple[Axle, ...], trimmed: Trimmed, wr
 
 
 def _fit_steering(car: CarDesign, trimmed: Trimmed, write: Write, log: Log) -> None:
-    """Find the pinion for the ratio, or the ratio of the pinion."""
+    """Find the pinion radius for a steering ratio, or the ratio for a pinion radius."""
     target = car.table.steering.ratio
     if target is None and car.table.steering.pinion_radius_m is None:
         target = _RATIO
@@ -453,7 +453,7 @@ def _fit_steering(car: CarDesign, trimmed: Trimmed, write: Write, log: Log) -> N
 
 
 def _ratio(held: HeldCar) -> float:
-    """Return the steering ratio about straight ahead: steering wheel over mean steer angle, within 20 deg, unloaded."""
+    """Return the steering ratio about straight ahead, within 20 deg and without load."""
     steer = []
     for angle in _STEER_RAD:
         held.equilibrium(Case("contact", steering_wheel_rad=float(angle)))

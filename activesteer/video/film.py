@@ -1,4 +1,4 @@
-"""Films of recordings: cameras behind the car, above it or next to a wheel, and files as MP4."""
+"""Films of recordings: camera behind, above or next to the car, and MP4 files."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _SIDE_LIMIT: Final = 8192
 
 
 def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
-    """Aim a camera at the cars at a time [s], without the roll and heave of the first car, which it follows."""
+    """Aim a camera at the cars at a time [s], without the roll and heave of the followed car."""
     track = tracks[0]
     places = np.array([each.middle(time_s) for each in tracks])
     # All cars stay in the picture, unless they are so far apart that the first one could hardly be seen.
@@ -105,7 +105,7 @@ class Settings:
 
 
 class Film:
-    """Scenes and cameras for some recordings, a context for a `with` block."""
+    """Scenes and cameras of a film, as a context manager."""
 
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
         """Build the scenes."""
@@ -157,7 +157,7 @@ class Film:
 
 
 class _Pane:
-    """A pane of the frame with its own scene and camera."""
+    """Pane of the frame, with its own scene and camera."""
 
     def __init__(
         self,
@@ -167,7 +167,7 @@ class _Pane:
         paths: Sequence[NDArray[np.float64]],
         recordings: Sequence[Recording],
     ) -> None:
-        """Build the scene of some runs, with edges and scales that suit the recordings of all panes."""
+        """Build the scene of some runs with the edges and scales of the whole film."""
         self.size, self._settings = size, settings
         self._tracks = [track for track, _ in runs]
         first = runs[0][1].recording
@@ -202,7 +202,7 @@ class _Pane:
 
 
 def check(path: Path, size: tuple[int, int]) -> None:
-    """Check the conditions for writing before anything is drawn."""
+    """Check the output file and ffmpeg before anything is drawn."""
     if path.suffix.lower() != ".mp4":
         hint = "; `ffmpeg -i FILM.mp4 FILM.gif` converts it" if path.suffix.lower() == ".gif" else ""
         raise ParameterError(f"the name of a film must end in .mp4{hint}", file=str(path), allowed=(".mp4",))
@@ -229,7 +229,7 @@ def ffmpeg() -> str:
 
 @contextmanager
 def encoder(path: Path, size: tuple[int, int], rate_hz: float) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
-    """Yield a function that appends a frame, and create the file if the context ends without an error."""
+    """Yield a function that appends a frame. The file appears if the context ends without an error."""
     with atomic_write(path, PlaybackError) as part, tempfile.TemporaryFile() as log:
         part.open("wb").close()  # a folder that cannot be written is an error before anything is drawn
         command = [
@@ -274,7 +274,7 @@ def make_film(
     settings: Settings | None = None,
     progress: Callable[[float], Any] | None = None,
 ) -> int:
-    """Draw a film of recordings, write it to a file, and return the number of its frames."""
+    """Draw a film of recordings to a file, and return the number of frames."""
     settings = settings or Settings()
     check(path, settings.size)
     with Film(recordings, settings) as film, encoder(path, settings.size, settings.rate_hz) as write:

@@ -1,4 +1,4 @@
-"""Gauges over the frames: title, time, and values of each car."""
+"""Gauges on the frames: title, time, and values of each car."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Dials(NamedTuple):
     colour: str  # colour of its car, `#rrggbb`
 
     def value(self, channel: str, time_s: float) -> float:
-        """Return a channel at a time, or nan if it is not recorded or has no meaning."""
+        """Return a channel at a time, nan if unknown."""
         if channel not in self.recording or (channel == "sideslip_rad" and not self._moves(time_s)):
             return math.nan
         return float(np.interp(time_s, self.recording.time_s, self.recording[channel]))
@@ -56,7 +56,7 @@ class Dials(NamedTuple):
         return self.value("speed_mps", time_s) > SLOWEST_MPS
 
     def has(self, line: Line) -> bool:
-        """Return whether the run has a value for the line. An angle that no controller demands is left out."""
+        """Return whether the run has the signal of a line."""
         return line.channel in self.recording and line.of(self.recording) is not None
 
 
@@ -74,7 +74,7 @@ class Gauges:
             self._readings.pop()
 
     def _largest_scale(self) -> float:
-        """Set and return the largest scale at which rows fit into panes and texts cover no more than their share."""
+        """Set and return the largest scale at which the gauges fit and leave enough of the frame visible."""
         width, high = self._size[0] / len(self._panes), self._size[1] / 480.0
         scale = max(min(high, math.sqrt(width / 640.0 * high)), _LEGIBLE)
         most = LARGEST_SHARE * self._size[0] * self._size[1]
@@ -83,7 +83,7 @@ class Gauges:
         return scale
 
     def _fit(self, scale: float) -> float:
-        """Set the sizes for a scale, and return the area that the texts cover [pixels]."""
+        """Set the sizes for a scale, and return the covered area [pixels]."""
         self._row, self._gap = max(1, round(_ROW * scale)), _GAP * scale
         self._text, self._small = _font(_TEXT * scale), _font(_SMALL * scale)
         places = [max(self._text.getlength(dial.label) for dial in self._every) + 2.5 * self._gap]
@@ -128,7 +128,7 @@ class Gauges:
 
 
 class LargeSideslip:
-    """Name and sideslip angle of each run, legible in a small image."""
+    """Name and sideslip angle of each run, large enough for a small image."""
 
     def __init__(self, panes: Dialled, size: tuple[int, int]) -> None:
         """Choose the fonts."""
@@ -159,11 +159,11 @@ def _write(
     face: Font,
     anchor: str = "ls",
 ) -> None:
-    """Draw a text with its anchor, as Pillow names it, at a place [pixels]."""
+    """Draw a label at a position [pixels]."""
     ImageDraw.Draw(layer).text(place, text, colour, face, anchor)
 
 
 @lru_cache(maxsize=100)
 def _font(points: float) -> Font:
-    """Return the font of all texts over frames in a size [pixels]."""
+    """Return the font of all labels in a size [pixels]."""
     return ImageFont.load_default(max(6.0, points))

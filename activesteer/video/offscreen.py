@@ -30,7 +30,7 @@ _TRY_TIMEOUT_S: Final = 60.0
 
 @functools.cache
 def backend() -> str:
-    """Return the backend that MUJOCO_GL names, or the first backend that works.
+    """Return the backend of MUJOCO_GL, or the first backend that works.
 
     Each backend is tried in a process of its own: a broken driver may end the process, and PyOpenGL cannot change its
     backend once it has loaded one.
@@ -51,7 +51,7 @@ def backend() -> str:
 
 
 def _problem_with(name: str) -> str | None:
-    """Return the reason why a backend does not work here, or None if it works."""
+    """Return the reason why a backend does not work, None if it works."""
     environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"} | {"MUJOCO_GL": name}
     try:
         tried = subprocess.run(
@@ -104,13 +104,13 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:
-        """Prepare the scene of the next frame, ready for more geometry."""
+        """Prepare the scene of the next frame. You may then add geometry."""
         every = int(mujoco.mjtCatBit.mjCAT_ALL)
         mujoco.mjv_updateScene(self._model, data, self._look, None, camera, every, self._scene)
         return self._scene
 
     def draw(self) -> NDArray[np.uint8]:
-        """Render the prepared scene, top row first, shape (height, width, 3), until the next frame overwrites it."""
+        """Render the prepared scene into an image, top row first. The next frame overwrites it."""
         self._context.make_current()
         mujoco.mjr_render(self._rect, self._scene, self._drawer)
         mujoco.mjr_readPixels(self._pixels, None, self._rect, self._drawer)

@@ -1,4 +1,4 @@
-"""Scene of a film as a MuJoCo model without physics: road, sky, course, and cars whose bodies are placed one by one.
+"""Scene of a film: a MuJoCo model without physics, whose bodies are moved one by one.
 
 The scene is built from the solids in a recording, not from the MJCF that the recording also holds. So no file is
 compiled, and a ghost car consists of the same solids, drawn transparent.
@@ -71,7 +71,7 @@ class FilmedCar(NamedTuple):
 
 
 class RenderScene:
-    """Scene of road, course and cars, as `model` and `data` for a renderer or a viewer."""
+    """Scene of road, course and cars, for a renderer or a viewer."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class RenderScene:
         drawn: DrawnSurface | None = None,
         paths: Sequence[Array] = (),
     ) -> None:
-        """Build the scene, with edges next to the paths of the cars [m] on a straight road."""
+        """Build the scene, with edges along the cars' paths [m] on a straight road."""
         try:
             spec = mujoco.MjSpec.from_string(_BASE.format(width=size[0], height=size[1]))
             add_road(spec, road or Road(), drawn)
@@ -126,7 +126,7 @@ class RenderScene:
         data.mocap_quat[self._shadow[car]] = np.cos(half), 0.0, 0.0, np.sin(half)
 
     def update(self) -> None:
-        """Update everything that is attached to the bodies, and fade out a ghost near the car that it accompanies."""
+        """Update all geometry attached to the bodies, and fade out a ghost near its car."""
         chassis = [self.data.mocap_pos[mocap[index]] for mocap, index in zip(self._mocap, self._chassis, strict=True)]
         for ghost, geoms, tendons in self._ghosts:
             apart = min(float(np.linalg.norm(chassis[ghost] - chassis[other])) for other in range(ghost))
@@ -193,7 +193,7 @@ def _add_solid(body: mujoco.MjsBody, solid: Primitive, car: FilmedCar) -> None:
 
 
 def _add_shadow_material(spec: mujoco.MjSpec) -> None:
-    """Add the material of the shadows: black, opaque in the middle and transparent at the edges."""
+    """Add the material of the shadows, opaque in the middle and transparent at the edges."""
     away = np.abs(np.linspace(-1.0, 1.0, 64))
     inside = np.clip((1.0 - away) / _SHADOW_FADES, 0.0, 1.0)
     faded = inside**2 * (3.0 - 2.0 * inside)
@@ -206,7 +206,7 @@ def _add_shadow_material(spec: mujoco.MjSpec) -> None:
 
 
 def _add_shadow(spec: mujoco.MjSpec, name: str, hull: Sequence[Primitive], car: FilmedCar) -> None:
-    """Add the shadow below the chassis: with the same heading, but on the road."""
+    """Add the shadow below the chassis, on the road with the heading of the car."""
     body = spec.worldbody.add_body(name=name, mocap=True)
     if not hull:
         return

@@ -1,4 +1,4 @@
-"""Road with a chequered surface that makes motion visible, lanes, cones and path."""
+"""Road with a chequered surface, which shows motion, and lanes, cones and path."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def add_road(spec: mujoco.MjSpec, road: Road, drawn: DrawnSurface | None = None)
 
 
 def _add_surface(spec: mujoco.MjSpec, corners: np.ndarray, triangles: np.ndarray) -> None:
-    """Add a surface in bands of height with different colours, because shading hardly shows small slopes."""
+    """Add a surface in height bands of different colours, because shading hardly shows small slopes."""
     heights = corners[triangles, 2].mean(axis=1)
     width = max(_LEAST_BAND_M, float(np.abs(heights).max()) / _BANDS)
     bands = np.round(heights / width).astype(int)
@@ -127,7 +127,7 @@ def add_course(spec: mujoco.MjSpec, course: Course) -> None:
 
 
 def add_edges(spec: mujoco.MjSpec, paths: Sequence[Array]) -> None:
-    """Add edges next to the cars' paths, a mark every 10 m and a post every 50 m, unless a car turns too far."""
+    """Add edges along the cars' paths, with a mark every 10 m and a post every 50 m."""
     x_m, y_m = np.concatenate([path[:, :2] for path in paths]).T
     half_m = max(_LEAST_HALF_WIDTH_M, float(np.abs(y_m).max()) + _BESIDE_CAR_M)
     if half_m > _MOST_HALF_WIDTH_M:
@@ -187,7 +187,7 @@ def _box(
 def _beam(
     spec: mujoco.MjSpec, ends: tuple[float, float, float, float], width: float, height: float, rgba: tuple[float, ...]
 ) -> None:
-    """Add a flat box from one place on the road to another."""
+    """Add a flat box between two positions on the road."""
     x0, y0, x1, y1 = ends
     half = 0.5 * np.arctan2(y1 - y0, x1 - x0)
     spec.worldbody.add_geom(

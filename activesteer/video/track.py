@@ -1,4 +1,4 @@
-"""Poses of a car at any time, its traces on the road, and the markings next to it: wheel angles and tyre forces."""
+"""Poses of a car over time, its traces on the road, and its wheel angle and tyre force markings."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ _SHOWN_RAD: Final = np.radians(0.3)
 
 
 class Track:
-    """Poses of a car over time, from the first usable one at `start_s` to the last at `end_s`."""
+    """Poses of a car between the first and the last usable one."""
 
     def __init__(self, recording: Recording, name: str) -> None:
-        """Read the poses that can be drawn, without those at the end of a run that diverged."""
+        """Read the poses that can be drawn."""
         poses = recording.poses
         self.bodies = poses.names
         whole = poses.usable()
@@ -62,7 +62,7 @@ class Track:
         self._direction_rad = direction_of_motion(self._time_s, middle_m, self._heading_rad)
 
     def poses(self, time_s: float) -> tuple[Array, Array]:
-        """Return positions [m] and orientations w x y z of the bodies. Outside the recording, the end poses count."""
+        """Return positions [m] and orientations w x y z of the bodies at a time, with the end poses held."""
         last = len(self._time_s) - 1
         after = min(max(int(np.searchsorted(self._time_s, time_s, side="right")), min(1, last)), last)
         before = max(after - 1, 0)
@@ -80,7 +80,7 @@ class Track:
         return float(np.interp(time_s, self._time_s, self._heading_rad))
 
     def direction(self, time_s: float) -> float:
-        """Return the averaged direction of motion at a time [rad] (see `drawing.cars`)."""
+        """Return the smoothed direction of motion at a time [rad] (see `drawing.cars`)."""
         return float(np.interp(time_s, self._time_s, self._direction_rad))
 
     def chassis(self, time_s: float) -> Array:
@@ -97,11 +97,11 @@ class Track:
         return self.chassis(time_s) + self.turn(time_s) @ (self._middle_m, 0.0, 0.0)
 
     def path(self) -> tuple[Array, Array]:
-        """Return all times [s], and the midpoints of the axles at the height of the chassis [m], shape (k, 3)."""
+        """Return all times [s], and the axles' midpoints at the height of the chassis [m], shape (k, 3)."""
         return self._time_s, self._middles_m
 
     def wheel_centre(self, corner: str, time_s: float) -> Array:
-        """Return the centre of a wheel at a time [m], if the wheel does not move relative to the chassis."""
+        """Return the centre of a wheel at a time [m], for a wheel that does not move relative to the chassis."""
         body = f"{corner}_wheel"
         if body not in self.bodies:
             raise PlaybackError(
@@ -122,7 +122,7 @@ class Traces:
     def __init__(
         self, recording: Recording, track: Track, size: Footprint, colour: str, place: int = 0, *, uneven: bool = False
     ) -> None:
-        """Divide the traces into pieces."""
+        """Divide the traces into segments."""
         times, places = track.path()
         heights = places[:, 2] + _UNEVEN_Z_M if uneven else np.zeros(len(times))
         self._path = _pieces(
@@ -153,7 +153,7 @@ class Traces:
 
 
 def _pieces(times: Array, places: Array, drawn: np.ndarray) -> tuple[Array, Array]:
-    """Return the times at the ends of the pieces of a line [s], shape (n,), and both ends [m], shape (n, 2, 3)."""
+    """Return the end times [s] of the segments of a line, and both ends of each [m], shape (n, 2, 3)."""
     drawn = drawn & np.isfinite(places).all(axis=1)
     places = np.nan_to_num(places)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(places[:, :2], axis=0).T))])
@@ -171,7 +171,7 @@ def _strip(scene: mujoco.MjvScene, start: Array, stop: Array, width_m: float, rg
 
 
 class Markings:
-    """Wheel angles and tyre forces of one car, with `notes` that give their scales in words."""
+    """Wheel angle and tyre force markings of one car."""
 
     def __init__(self, recording: Recording, track: Track, colour: str, shown_with: Sequence[Recording]) -> None:
         """Prepare the markings."""

@@ -52,7 +52,16 @@ def test_pages_for_the_disk_promise_no_search(site: Path) -> None:
 
 @pytest.mark.render
 @pytest.mark.parametrize(
-    "page", ["chassis_control", "controller_results", "claims", "gallery", "manoeuvre_keys", "reference/vehicle"]
+    "page",
+    [
+        "chassis_control",
+        "controller_results",
+        "claims",
+        "claims_other_cars",
+        "gallery",
+        "manoeuvre_keys",
+        "reference/vehicle",
+    ],
 )
 def test_pages_are_no_wider_than_a_telephone(site: Path, browser: Browser, page: str) -> None:
     """Wide tables and code scroll by themselves; the title, which slides in at the top, is cut."""

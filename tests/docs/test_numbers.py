@@ -56,7 +56,8 @@ def test_claims_are_counted_in_words_as_in_the_table() -> None:
     assert f"{paper} of the {every} claims hold together" in words
     assert f"from the literature, {literature} are reproduced" in words
     assert f"{ideal} of the claims hold on average; with production sensors {production}" in words
-    assert f"{paper} of {every} hold in one setting that was searched for, {literature} with a driver" in README
+    assert f"With a driver from the literature, {literature} of {every} hold." in README
+    assert f"In one setting found by a search for it, {paper} hold together." in README
 
 
 def test_the_measured_circle_has_the_same_numbers_on_all_pages() -> None:

@@ -142,7 +142,7 @@ class Scenario:
 
 
 def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance: float) -> Claim:
-    """Return the claim, which passes if all its conditions hold and there is no obstacle."""
+    """Return the claim. It passes if all its conditions hold and there is no obstacle."""
     needed = {place for one in statement.requirements for place in one.metrics}
     runs: dict[EvaluatedRun, dict[str, float | None]] = {run: {} for _, run in needed}
     for name, run in needed:
@@ -160,7 +160,7 @@ def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance:
 
 
 def _is_cut_short(recording: RecordingLike) -> bool:
-    """Return whether a run ended before its manoeuvre, where the last row may be one step before the end."""
+    """Return whether a run ended early. The last row may be one step before the end of the manoeuvre."""
     maneuver: Any = recording.metadata.get("maneuver")
     duration_s = maneuver.get("duration_s") if isinstance(maneuver, Mapping) else None
     time_s = recording.time_s
@@ -171,7 +171,7 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> tuple[str, float]:
-    """Return the reason why no claim can pass on three runs, and its distance from vanishing, 0 to 1."""
+    """Return why no claim can pass on three runs, and how far this obstacle is from vanishing, 0 to 1."""
     # A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
     # `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
     # demand as much of an actuator that its system does not have: an action that was not performed proves nothing.
@@ -191,7 +191,7 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
 
 
 def straight_ahead(recording: RecordingLike) -> slice:
-    """Return the rows before the steering wheel is first turned, or none if it is turned from the start."""
+    """Return the samples before the steering wheel is first turned."""
     turned = np.abs(recording["steering_wheel_rad"]) > AHEAD_RAD
     return slice(0, int(np.argmax(turned)) if turned.any() else len(turned))
 
@@ -207,7 +207,7 @@ def largest_action(recording: RecordingLike, demand: str) -> float:
 
 
 def _means(values: Array, timestep_s: float) -> Array:
-    """Return the mean of a signal over `MEAN_S` around every sample, or over a shorter signal, shape (n,)."""
+    """Return the mean of a signal over a window of `MEAN_S` around every sample, shape (n,)."""
     width = min(len(values), max(1, round(MEAN_S / timestep_s)))
     return np.convolve(values, np.full(width, 1.0 / width), mode="same") if width else values
 
@@ -235,7 +235,7 @@ def _step_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics, whole: bool) -> RunMetrics:
-    """Return the added angles, and the times from the step to the common level of each signal.
+    """Return the steer angles that a system adds, and the time of each signal from the step to the common level.
 
     A time is nan if its run is incomplete or stays below the level.
     """
@@ -256,7 +256,7 @@ def _step_compared(recordings: Mapping[str, RecordingLike], metrics: RunMetrics,
 
 
 def _added_angles(recordings: Mapping[str, RecordingLike], _: RunMetrics, whole: bool) -> RunMetrics:
-    """Compare the demanded rear and superposed angle, without the hinges' compliance, since the start of steer."""
+    """Return correlation and opposite signs of the demanded rear and superposition angles, from reversal to the end."""
     if not whole:
         return {TOGETHER: {"added_angles_common_s": 0.0}}
     ars, afs = recordings["ars"], recordings["afs"]
@@ -304,14 +304,14 @@ def _slippery_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 class _Limit(float):
-    """Number of a criterion, which `{:%}` writes with a space before the percent sign."""
+    """Number in a criterion. The format `{:%}` writes a space before the percent sign."""
 
     def __format__(self, spec: str) -> str:
         return f"{100.0 * self:.0f} %" if spec == "%" else f"{float(self):g}"
 
 
 def _statements() -> dict[str, tuple[Statement, ...]]:
-    """Return the rows of `statements.toml`, by manoeuvre, with their limits."""
+    """Return the claims of `statements.toml` by manoeuvre, with their limits."""
     table, source = read_toml(Path(__file__).with_name("statements.toml"), ParameterError)
     least = metric_table
     angles = {

@@ -1,4 +1,4 @@
-"""The scorecard of the claims, and what the package stores about them: settings and reasons.
+"""The scorecard of the claims, and the stored settings and reasons for claims that are not reproduced.
 
 A claim is passed, failed, or known not to be reproduced.
 
@@ -86,7 +86,7 @@ def read_setting(name: str) -> Setting:
 
 
 def setting_of(recording: RecordingLike) -> str:
-    """Return the name of a run's setting, or an empty text if it matches no setting of the package."""
+    """Return the name of a run's setting, empty if it matches no setting of the package."""
     name, overrides = entry(recording, "maneuver", "name"), recording.metadata.get("overrides") or {}
     if name not in SCENARIOS or not isinstance(overrides, Mapping):
         return ""
@@ -96,7 +96,7 @@ def setting_of(recording: RecordingLike) -> str:
 
 
 def claims_for(recording: RecordingLike) -> Scenario | None:
-    """Return the scenario that checks the paper's claims about the manoeuvre of a run, or None if it has none."""
+    """Return the scenario of the claims that the manoeuvre of a run checks, or None without such claims."""
     # The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a
     # step steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car
     # and any duration are judged.
@@ -175,7 +175,7 @@ class Scorecard:
         }
 
     def to_text(self) -> str:
-        """Return the scorecard for a terminal: number, verdict, text, then the values, in degrees and km/h."""
+        """Return the scorecard for a terminal: number, verdict, text and values of each claim, in degrees and km/h."""
         lines = []
         for claim, verdict, reason in self.judged:
             short = {Verdict.FAILED: "FAILED", Verdict.UNEXPECTED: "passed!"}.get(verdict, verdict.value)

@@ -1,4 +1,4 @@
-"""The paper's figures from recordings, with the same values and curves 1, 2, 3, and units at every axis.
+"""The paper's figures from recordings, with the paper's curve numbers 1, 2 and 3.
 
 `draw_all` makes the figures of whole reproductions, `figure_for` makes one figure of a manoeuvre. matplotlib is an
 extra of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made

@@ -1,4 +1,4 @@
-"""The paper's figures over one time axis that shows the transient, and the style of all figures, in degrees.
+"""The paper's figures over time, limited to the transient, and the style of all figures.
 
 The figures can be printed at their own width and in grey: text of 8 pt, and lines with different dashes. The cars that
 do not spin set the scale. Figures 2 and 11 (step steer), 12 and 13 (sine with dwell), 16, 17, 20, 21, 23 and 24 (along
@@ -48,7 +48,7 @@ MAX_POINTS: Final = 5000
 
 
 class DrawnRun(NamedTuple):
-    """A run as it is drawn."""
+    """Data of a run in a figure."""
 
     recording: RecordingLike  # the run
     look: RunLook  # label, colour and dashes
@@ -65,7 +65,7 @@ class DrawnRun(NamedTuple):
 
 
 def drawn_runs(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
-    """Return the runs in the paper's order, with the same colours of the three systems everywhere."""
+    """Return the runs in the paper's order, with the fixed colours of the three systems."""
     if not recordings:
         raise ParameterError("there is no recording to draw, at least one is needed")
     return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
@@ -100,14 +100,14 @@ def friction_label(low: float, high: float) -> str:
 
 
 def present(panels: Sequence[Panel], drawn: Sequence[DrawnRun]) -> list[Panel]:
-    """Return the panels, without the added angles if no run has any."""
+    """Return the panels. The panel of the added angles is left out if no run has any."""
     return [
         panel for panel in panels if panel is not PANELS["added"] or any(added_lines(each.recording) for each in drawn)
     ]
 
 
 def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return every n-th sample, with n for at most `MAX_POINTS` samples."""
+    """Thin samples to at most `MAX_POINTS`."""
     return np.asarray(values[:: -(-len(values) // MAX_POINTS) or 1], dtype=np.float64)
 
 
@@ -129,7 +129,7 @@ def note(axis: Axes, text: str, at: tuple[float, float], offset_pt: tuple[float,
 
 
 def name_curves(figure: Figure, axis: Axes, lines: Sequence[tuple[str, float, LineStyle]] = ()) -> None:
-    """Draw the legend of the runs above all axes, with further kinds of line by text, width and style."""
+    """Draw the legend of the runs above all axes, with entries for other line styles."""
     # Angles added in front and places with another friction get an entry if they are drawn.
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Patch  # noqa: PLC0415
@@ -208,7 +208,7 @@ def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
-    """Return the time from before the first motion to after the last run has settled [s].
+    """Return the time range from before the first motion to after the last run has settled [s].
 
     Runs that spin do not count.
 
@@ -232,7 +232,7 @@ def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
 
 
 def show_lost_beside(axis: Axes, drawn: Sequence[DrawnRun], panel: Panel) -> None:
-    """Keep the axis scale of the cars that do not spin, and draw all cars in an inset."""
+    """Scale the axis for the cars that do not spin, and draw all cars in an inset."""
     # The inset stands in the corner that the curves leave free.
     kept = [curve for curve in drawn if not curve.lost]
     if len(kept) in (0, len(drawn)) or panel is PANELS["added"]:
@@ -305,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times when a wheel is on a different friction than at the start, once for each run."""
+    """Shade the times when a wheel is on another friction than at the start, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])
@@ -324,7 +324,7 @@ def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def time_figure(recordings: Mapping[str, RecordingLike], panels: Sequence[Panel] = panels_in(FIGURE)) -> Figure:
-    """Draw panels over one time axis in a column's width, with phases or the times of a standard's criterion."""
+    """Draw panels over one time axis in the width of a text column, with phases or the times of a standard."""
     drawn = drawn_runs(recordings)
     shown = present(panels, drawn)
     figure = new_figure(width_in=COLUMN_IN, height_in=0.8 + PANEL_IN * len(shown))

@@ -34,7 +34,7 @@ TRACK_ASPECT: Final = 0.35
 
 
 def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Draw the course (path, lanes with their sizes, cones) on an axis that gives the factor that stretches y."""
+    """Draw a course (path, lanes with their sizes, cones) on an axis with stretched lateral positions."""
     course = read_course(drawn_runs(recordings)[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.65 + _axis_height_in(course, COURSE_ASPECT))
     axis: Axes = figure.subplots()
@@ -48,7 +48,7 @@ def course_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def track_figure(recordings: Mapping[str, RecordingLike]) -> Figure:
-    """Draw tracks of the front axle centre along the course, on an axis that gives the factor that stretches y."""
+    """Draw tracks of the front axle centre along the course, on an axis with stretched lateral positions."""
     drawn = drawn_runs(recordings)
     course = read_course(drawn[0].recording)
     figure = new_figure(width_in=PAGE_IN, height_in=0.95 + _axis_height_in(course, TRACK_ASPECT))
@@ -93,7 +93,7 @@ def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
 
 
 def _shade_body(axis: Axes, curve: DrawnRun) -> None:
-    """Shade the road that the front of the body covers, because the stretched map distorts a drawn car."""
+    """Shade the area that the front of the body covers. A drawn car would be distorted on the stretched map."""
     try:
         left, right, *_ = lanes.corners(curve.recording, read_footprint(curve.recording))
     except RecordingError:
@@ -104,7 +104,7 @@ def _shade_body(axis: Axes, curve: DrawnRun) -> None:
 
 
 def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
-    """Draw the places of the road with another friction, behind everything."""
+    """Draw the patches of another friction, behind everything else."""
     from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
 
     road = road_of(curve.recording.metadata)
@@ -120,7 +120,7 @@ def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
 
 
 def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.bool_]) -> None:
-    """Draw lanes, path and cones with their own legend, and set the limits of the axis."""
+    """Draw lanes, path and cones with a separate legend, and set the limits of the axis."""
     from matplotlib.lines import Line2D  # noqa: PLC0415 - an extra, and slow to import
     from matplotlib.patches import Ellipse, Rectangle  # noqa: PLC0415
 
@@ -158,7 +158,7 @@ def _draw_course(axis: Axes, course: Course, aspect: float, struck: NDArray[np.b
 
 
 def _stretch(view: CourseView, aspect: float) -> int:
-    """Return the factor that stretches lateral positions for an axis with a ratio `aspect` of height to width."""
+    """Return the factor that stretches lateral positions on an axis with the ratio `aspect` of height to width."""
     (left, right), (low, high) = view.x_m, view.y_m
     return max(1, round(aspect * (right - left) / (high - low)))
 

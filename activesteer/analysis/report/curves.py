@@ -1,4 +1,4 @@
-"""Data of the plots of a report: signals of runs over one time axis, thinned, in their units for display."""
+"""Data of the plots of a report: thinned signals in display units, on one time axis."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ DIGITS: Final = 4
 
 
 def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bool, Array]]:
-    """Yield the lines of a run, each with a flag for dotted lines: all lines but the first of the panel."""
+    """Yield the lines of a run, each with a flag for a dotted line."""
     if panel.extreme is not None:
         yield False, panel.extreme.reduce([recording[line.channel] for line in panel.lines])
         return
@@ -72,7 +72,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:
-    """Return the times of all plots [s]: thinned times of the first run, up to the end of the longest run."""
+    """Return the times of all plots [s]."""
     first = times_s[0]
     start = min(float(time_s[0]) for time_s in times_s)
     end = max(float(time_s[-1]) for time_s in times_s)
@@ -104,7 +104,7 @@ def _sampled(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
-    """Return the values of a curve, reduced to its extremes for a long run so that no peak is lost."""
+    """Return the values of a curve, reduced to extremes for a long run so that no peak is lost."""
     # Each pair of instants takes the least and the greatest value up to the next pair.
     if len(grid) < 2 or grid[1] - grid[0] <= MAX_STEP_S:
         return _sampled(time_s, values, grid)
@@ -120,7 +120,7 @@ def _reduced(time_s: Array, values: Array, grid: Array) -> Array:
 
 
 def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
-    """Return numbers for JSON, with None for nan, and only digits that can be seen."""
+    """Return numbers for JSON with the visible digits, and None for nan."""
     finite = np.isfinite(values)
     if decimals is None:
         known = values[finite]
@@ -134,7 +134,7 @@ def _rounded(values: Array, decimals: int | None = None) -> list[float | None]:
 
 
 def _track(group: Group, grid: Array) -> dict[str, Any] | None:
-    """Return course, tracks of the front axle centre [m], heading [rad] and sizes of the cars [m]."""
+    """Return the data of the track plot: course, tracks and headings, and sizes of the cars."""
     tracks = []
     factors = wheel_angles.factors([run.recording for run in group.runs])
     for number, run in enumerate(group.runs):
@@ -164,7 +164,7 @@ def _track(group: Group, grid: Array) -> dict[str, Any] | None:
 
 
 def _road(group: Group, tracks: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the places of another friction and the obstacles near the tracks: corners [m], friction or words."""
+    """Return the friction patches and obstacles near the tracks, each with its corners [m] and its label."""
     ends = []
     for key in ("x", "y"):
         seen = [value for track in tracks for value in track[key] if value is not None]

@@ -1,4 +1,4 @@
-"""The runs of a report: opened, named, and grouped by manoeuvre."""
+"""The runs of a report, opened, named and grouped by manoeuvre."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from activesteer.recording.recording import run_names
 
 
 def judge(group: Group) -> Scorecard:
-    """Check the paper's claims about the runs of a group, or return an empty scorecard with the reason."""
+    """Check the paper's claims about the runs of a group. If that is impossible, return the reason."""
     # The group must hold a complete run of each of the three systems, in the same manoeuvre with the same car.
     recordings = {run.name: run.recording for run in group.runs}
     check = claims_for(group.runs[0].recording)
@@ -66,7 +66,7 @@ class ReportedRun(NamedTuple):
 
     @property
     def problem(self) -> str:
-        """Reason why the run is incomplete, or empty for a complete run."""
+        """Reason why the run is incomplete, empty for a complete run."""
         metadata = self.recording.metadata
         return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
 
@@ -80,7 +80,7 @@ class Group(NamedTuple):
 
 
 def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
-    """Open recordings by path. Of incomplete or damaged recordings, open the readable part."""
+    """Open recordings, or the readable part of an incomplete or damaged recording."""
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:
@@ -90,7 +90,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 
 
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
-    """Return the runs by manoeuvre, in the paper's order, with runs in the paper's setting separate."""
+    """Return the runs by manoeuvre, in the paper's order. Runs in the paper's setting form separate groups."""
     if not 1 <= len(recordings) <= MAX_RUNS:
         raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}

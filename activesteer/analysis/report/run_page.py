@@ -64,7 +64,7 @@ def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[st
 
 
 def report_page(recordings: Mapping[str, Recording], made: date | None = None) -> str:
-    """Return the report of runs as HTML, the same for the same recordings and date."""
+    """Return the report of runs as HTML. The same recordings and date give the same text."""
     groups = groups_of(recordings)
     anchors = {f"group-{number}": group for number, group in enumerate(groups, start=1)}
     cards, several = [judge(group) for group in groups], len(groups) > 1
@@ -98,7 +98,7 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
 
 
 def _contents(anchors: Mapping[str, Group], cards: Sequence[Scorecard]) -> Section:
-    """Return the table of all manoeuvres: a row with the claims about each, then a row for each of its runs."""
+    """Return the table of all manoeuvres, with rows for the claims and for each run."""
     has_headline = any(HEADLINE in key_figures(group) for group in anchors.values())
     lines, about = [], []
     for (anchor, group), card in zip(anchors.items(), cards, strict=True):
@@ -195,7 +195,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
 
 
 def _chip(item: Judged, anchor: str) -> Markup:
-    """Return the number of a claim with its verdict, which leads to its details."""
+    """Return the number of a claim with its verdict, as a link to its details."""
     (kind, mark), claim = _VERDICT_LOOK[item.verdict], item.claim
     return Markup('<a class="chip {}" href="#{}-{}" title="{} ({})">{} {}</a>').format(
         kind, anchor, claim.id, claim.text, item.verdict.value, mark, claim.id
@@ -287,7 +287,7 @@ class Row(NamedTuple):
 
 
 def parameters(recordings: Sequence[Recording], *tables: str) -> list[Row]:
-    """Return the entries of tables of the metadata of all runs, in the order of the first run."""
+    """Return the parameters of all runs as table rows, in the order of the first run."""
     flat = []
     for run in recordings:
         chosen = {key: run.metadata[key] for key in tables if key in run.metadata}
@@ -335,12 +335,12 @@ def results(group: Group) -> list[dict[str, Any]]:
 
 
 def _is_judged(run: ReportedRun) -> bool:
-    """Return whether a change from or to a run can be rated: the run is complete, and the car under control."""
+    """Return whether differences from a run can be rated: it is complete, and the car is under control."""
     return not run.problem and is_controlled(run.recording.metrics)
 
 
 def key_figures(group: Group) -> dict[str, str]:
-    """Return the column titles of the key figures, with units, and the metrics that at least one run has."""
+    """Return the key figures that at least one run has, and their column titles with units."""
     names = {name for run in group.runs for name in run.recording.metrics}
     found = {}
     for title, metrics in KEY_FIGURES.items():
@@ -351,7 +351,7 @@ def key_figures(group: Group) -> dict[str, str]:
 
 
 def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> dict[str, Any]:
-    """Return the text of a key figure, and its difference from the first run with the significance, if it has one."""
+    """Return a key figure with its difference from the first run and the significance of the difference."""
     sizes = abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = shown(name, metrics, number(name, value))
@@ -366,7 +366,7 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
-    """Return the titles of the table of files, and a row for each run."""
+    """Return the table of files: its titles, and a row for each run."""
     runs = [(group, run) for group in groups for run in group.runs]
     changed = [changed_parameters(run) for _, run in runs]
     titles = ["File", "Manoeuvre", "Controller", "Vehicle", "Duration", *(["Changed"] if any(changed) else [])]
@@ -380,7 +380,7 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
 
 
 def _changed(group: Group) -> list[str]:
-    """Describe the overrides of all runs, or of each run with its name if they differ."""
+    """Describe the overrides of the runs, once if they are equal in all runs."""
     words = [changed_parameters(run) for run in group.runs]
     if len(set(words)) == 1:
         return words[:1] if words[0] else []
@@ -388,14 +388,14 @@ def _changed(group: Group) -> list[str]:
 
 
 def changed_parameters(run: ReportedRun) -> str:
-    """Return a description of the overrides of a run, with their values and keys, empty without overrides."""
+    """Describe the overrides of a run with their values and keys, empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
     labels = {key: parameter_label(key) for key in changed} if isinstance(changed, Mapping) else {}
     return ", ".join(f"{words} {changed[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())
 
 
 def metric_rows(group: Group) -> list[list[Text]]:
-    """Return the metrics with their units, with their differences from the first run."""
+    """Return the metrics with units and differences from the first run."""
     values = [run.recording.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):

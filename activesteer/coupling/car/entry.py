@@ -1,4 +1,4 @@
-"""C functions of an exported car: its step, the channels that are computed from a row, and the faults of actuators.
+"""C functions of an exported car: its step, the computed channels, and the faults of actuators.
 
 They contain the kernels of a simulation; the C code around them holds no law of its own.
 """
@@ -52,7 +52,7 @@ _limit_pointer: Final = pointer_to(from_dtype(record_of(Actuator)))
 
 @compiled_callback(types.void, *(types.intp,) * 10)
 def derive(rows, places, design, gravity, forces, n_forces, limits, n_limits, numbers, motion):
-    """Compute those channels of the last row that are not copied from it."""
+    """Compute the channels of the last row that are not copied from it."""
     row = word_pointer(rows)
     out = f64_pointer(numbers)
     length, speed = f64_pointer(row[_LENGTH]), f64_pointer(row[_SPEED])

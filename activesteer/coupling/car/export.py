@@ -71,7 +71,7 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """A car in the form of an export."""
+    """An exported car."""
 
     name: str  # of the vehicle
     variables: list[Variable]  # its variables; the value reference is the place
@@ -159,7 +159,7 @@ def _model(model: mujoco.MjModel) -> bytes:
 
 
 def _state(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable]) -> np.ndarray[Any, Any]:
-    """Return the start as `exchange` of car.c reads it."""
+    """Return the initial state in the format of `exchange` in car.c."""
     vehicle = loop.vehicle
     engine = np.empty(mujoco.mj_stateSize(vehicle.model, _STATE))
     mujoco.mj_getState(vehicle.model, vehicle.data, engine, _STATE)
@@ -178,7 +178,7 @@ def _state(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable]) -> n
 
 
 def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ...]]:
-    """Return the actuators that can fail as car.c takes them."""
+    """Return the actuators that can fail in the format of car.c."""
     rows: list[tuple[int | float, ...]] = []
     for part in faulty_parts(loop):
         for name in ACTUATORS[part].members:
@@ -189,7 +189,7 @@ def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ..
 
 
 def _seeds(loop: ClosedLoop) -> bytes:
-    """Return, for each seed and sensor, the random number of its offset and the key of its noise."""
+    """Return the random offset and the noise key of each seed and sensor."""
     block = loop.vehicle.sensors
     if block is None:
         return bytes(8)
@@ -298,7 +298,7 @@ def _data(
 
 
 def _plain(values: Any) -> list[int | float]:
-    """Return numbers of NumPy and bool as Python's."""
+    """Convert numbers of NumPy, and bool, to Python's."""
     return [value.item() if isinstance(value, np.generic) else value for value in values]
 
 

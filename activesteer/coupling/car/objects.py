@@ -140,7 +140,7 @@ def _words(array: Any) -> list[tuple[int, str]]:
 
 
 class _Known:
-    """All memory that an address may point to."""
+    """Memory regions that an address may point to."""
 
     def __init__(self, vehicle: Vehicle, parts: Mapping[str, NDArray[Any]], places: Mapping[str, int]) -> None:
         self.functions: list[str] = []
@@ -162,7 +162,7 @@ class _Known:
         ]
 
     def target(self, address: int) -> Relocation | None:
-        """Return the place that an address points to, or None for a number that is not a known address."""
+        """Return the region and offset of an address, or None for any other number."""
         if address in self._functions:
             name = self._functions[address]
             if name not in self.functions:
@@ -174,13 +174,13 @@ class _Known:
         return None
 
     def sure(self, array: NDArray[Any]) -> Relocation:
-        """Return the place of an array that is known."""
+        """Return the region and offset of a known array."""
         found = self.target(array.ctypes.data)
         return Relocation(0, SEGMENT, 0, 0) if found is None or not array.size else found
 
 
 def _arrays(kind: str, owner: mujoco.MjModel | mujoco.MjData) -> list[tuple[int, int, Relocation]]:
-    """Return address, size and place of all arrays that words of a struct of the engine point to."""
+    """Return address, size and position of every array to which a struct of the engine points."""
     words = np.ctypeslib.as_array((ctypes.c_uint64 * (_STRUCT_BYTES[kind] // 8)).from_address(owner._address))
     code, found = {"model": MODEL_ARRAY, "data": DATA_ARRAY}[kind], []
     for name in dir(owner):

@@ -66,7 +66,7 @@ _MEANINGS: Final = {
 
 
 def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
-    """Return the inputs, first the inputs of the native step in the order of `CARRIED_OUT`."""
+    """Return the input variables. They start with the inputs of the native step, in the order of `CARRIED_OUT`."""
     driver, actuator = loop.commands
     starts = dict(zip(COMMANDS, (*numbers_in(driver), *numbers_in(actuator)), strict=True))
     numbers = {number.name: number for command in (driver, actuator) for number in numbers_of(type(command))}
@@ -108,7 +108,7 @@ def faulty_parts(loop: ClosedLoop) -> list[str]:
 
 
 def _fault_inputs(part: str) -> list[Variable]:
-    """Return the inputs for the faults of a part: kind, and offset of its demand."""
+    """Return the input variables for the faults of a part: kind, and offset of its demand."""
     unit, name = ACTUATORS[part].unit, part.replace("_", " ")
     kinds = [f"{number} {kind}" for number, kind in enumerate(FAULT_KINDS)
              if unit != "Nm" or kind not in ("float", "runaway to the right")]  # fmt: skip
@@ -122,7 +122,7 @@ def _fault_inputs(part: str) -> list[Variable]:
 
 
 def outputs_of(loop: ClosedLoop, taken: set[str]) -> tuple[list[Variable], list[AxialForce], list[Actuator]]:
-    """Return the outputs: measurement, motion, and the recorded channels, with the laws of computed ones."""
+    """Return the output variables: measurement, motion and recorded channels."""
     found = [
         Variable(f"measured_{number.name}", number.recorded.unit, f"{number.recorded.meaning}, measured", OUTPUT,
                  source=FROM_RESULT, column=1 + place)

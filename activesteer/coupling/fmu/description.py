@@ -1,4 +1,4 @@
-"""An FMU as a file: its archive, which is foreign and perhaps hostile, and its description."""
+"""An FMU file: its archive, which is untrusted, and its description."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Archive:
         limits.check_count(size, limits.MAX_FMU_DESCRIPTION_BYTES, "bytes", self._error, file=DESCRIPTION)
 
     def kept(self, most_bytes: int) -> dict[str, bytes]:
-        """Return the data of the FMU for a recording: the file, or description and digest of a larger one."""
+        """Return the data of the FMU for a recording: the file itself, or description and digest if it is large."""
         if len(self._data) <= most_bytes:
             return {self.path.name: self._data}
         return {f"{self.path.stem}.sha256": self.key.encode(), f"{self.path.stem}.xml": self.description}
@@ -94,7 +94,7 @@ _unpacked: Final[dict[str, Path]] = {}
 
 
 def _write(archive: zipfile.ZipFile, member: zipfile.ZipInfo, target: Path) -> None:
-    """Write a member, at most the size that it declares."""
+    """Write a member of the archive, up to the size that it declares."""
     target.parent.mkdir(parents=True, exist_ok=True)
     left = member.file_size
     with archive.open(member) as source, target.open("xb") as file:
@@ -188,7 +188,7 @@ def describe_fmu(archive: Archive, kind: Kind) -> Description:
 
 
 def _variable(variable: Any, description: Any) -> Variable | None:
-    """Return a variable, or None if it holds no numbers."""
+    """Return a variable, or None if it is not numeric."""
     version2 = description.fmiMajorVersion == 2
     kind, form = variable.type, _FORMATS.get(variable.type)
     if kind == "Boolean":
@@ -223,7 +223,7 @@ def _positive(text: Any) -> float | None:
 
 
 def _library(archive: Archive, identifier: str, kind: Kind) -> str:
-    """Return the member with the code for this platform."""
+    """Return the member with the library for this platform."""
     if not str(identifier).isidentifier():
         raise kind.fail(archive.path.name, f"its model identifier {identifier!r} is not the name of a library")
     for folder in BINARIES:
@@ -240,7 +240,7 @@ def _library(archive: Archive, identifier: str, kind: Kind) -> str:
 
 
 def _declared_unit(name: str | None, base: Any) -> Unit | None:
-    """Return a unit as an FMU declares it, by its base unit as FMPy reads it, or None for an unknown unit."""
+    """Return a unit of an FMU from its base unit, None for an unknown unit."""
     if name is None or base is None:
         return find_unit(name) if name else None
     others = any(getattr(base, other) for other in ("A", "K", "mol", "cd"))

@@ -1,4 +1,4 @@
-"""An instance of an FMU, called by function pointers, in this process or in a separate one.
+"""An instance of an FMU, called through function pointers, in this process or in a separate one.
 
 This file imports no library, because every isolated instance waits for the start of its process.
 """
@@ -32,7 +32,7 @@ START_LIMIT_S: Final = 30.0
 
 
 class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
-    """An FMU failed. The message describes the failure."""
+    """Failure of an FMU, described in the message."""
 
 
 class Group(NamedTuple):
@@ -45,7 +45,7 @@ class Group(NamedTuple):
 
 
 class Spec(NamedTuple):
-    """All data that an instance is created from."""
+    """Inputs for the creation of an instance."""
 
     library: str  # path of the shared library
     version: int  # 2 or 3
@@ -156,7 +156,7 @@ class LocalInstance:
         return struct.pack("=q", steps) + content.raw[: size.value]
 
     def deserialise(self, content: bytes) -> int:
-        """Return the number of the saved state that bytes hold."""
+        """Restore a saved state from bytes, and return its number."""
         (steps,), state = struct.unpack_from("=q", content), ctypes.c_void_p()
         name = "DeSerializeFMUstate" if self._spec.version == 2 else "DeserializeFMUState"
         self._must(name, (_S, _N, _P), content[8:], len(content) - 8, ctypes.byref(state))
@@ -164,7 +164,7 @@ class LocalInstance:
 
     @property
     def _state(self) -> str:
-        """Word for a state in the names of the FMI functions."""
+        """Name of a state in the FMI functions."""
         return "FMUstate" if self._spec.version == 2 else "FMUState"
 
     def _kept(self, state: Any, steps: int) -> int:
@@ -179,7 +179,7 @@ class LocalInstance:
             raise FmuFault(f"its library has no function {self._prefix}{name}") from None
 
     def _access(self, word: str, group: Group) -> tuple[Any, _Buffer]:
-        """Return function and memory that set or get a group."""
+        """Return the function and the memory that set or get a group."""
         buffer = _Buffer(group)
         sizes = () if self._spec.version == 2 else (group.size,)
         call = self._function(f"{word}{group.kind}", _P, _P, _N, _P, *(_N for _ in sizes))
@@ -224,7 +224,7 @@ class LocalInstance:
         self._must("ExitInitializationMode", ())
 
     def _must(self, name: str, types: Sequence[Any], *arguments: Any) -> None:
-        """Call a function that has to succeed."""
+        """Call a function, and raise an error if it fails."""
         status = self._function(name, _P, *types)(self._component, *arguments)
         if status > _WARNING:
             raise self._failed(name, status)
@@ -239,7 +239,7 @@ class LocalInstance:
         return f": {self._log[:_MAX_LOG]}" if self._log else ""
 
     def _said(self, *message: Any) -> None:
-        """Store the text of a log message, which is the last argument in both versions."""
+        """Store a log message, the last argument in both versions."""
         self._log = (message[-1] or b"").decode(errors="replace")
 
 

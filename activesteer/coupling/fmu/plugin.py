@@ -32,7 +32,7 @@ _KEYS: Final = ("signal", "unit")
 
 
 class Place(NamedTuple):
-    """A number within the messages of a block."""
+    """Position of a number within the messages of a block."""
 
     message: int  # place of the message among them
     field: int  # place of its field
@@ -50,14 +50,14 @@ class Link(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals in the messages of a block, by name."""
+    """Signals of messages, by name."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
     others: frozenset[str]  # names of fields that are no numbers
     words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:
-        """Return the name of a signal that is given with or without its unit, or None if there is none."""
+        """Return the full name of a signal given with or without its unit, None for an unknown name."""
         known = (other for other in self.places if other == name or split_ending(other)[0] == name)
         return next(known, None)
 
@@ -92,7 +92,7 @@ def signals_of(messages: Sequence[type[Any]]) -> Signals:
 def linked(
     variables: Mapping[str, Variable], signals: Signals, given: Mapping[str, Any], source: Source
 ) -> tuple[list[Link], list[str]]:
-    """Link each variable with its signal, and return the links and the variables without a signal."""
+    """Link variables with signals, and return the links and the unmatched variables."""
     links, left = [], []
     for name, variable in variables.items():
         entry = given.get(name)
@@ -111,7 +111,7 @@ def linked(
 
 
 def _entry(name: str, entry: Any, signals: Signals, source: Source) -> str:
-    """Return the signal of an entry of the map."""
+    """Return the signal of a map entry."""
     if not isinstance(entry, Mapping) or not entry or not all(isinstance(value, str) for value in entry.values()):
         problem = f'is {shown(entry)}; write {name} = {{ signal = "yaw_rate_radps", unit = "deg/s" }}'
         raise source.fail((name,), problem, entry)
@@ -174,7 +174,7 @@ class FmuBlock:
         self._bind(shared, None, 0)
 
     def _bind(self, shared: _Shared, held: Any, steps: int) -> None:
-        """Join the users of an instance."""
+        """Register with the blocks that share an instance."""
         fmu, kind = self._fmu, self._fmu.kind
         self._shared, self._block = shared, shared.new_block()
         self._held, self._steps = held, steps
@@ -232,7 +232,7 @@ class FmuBlock:
         return self._held
 
     def _when(self) -> str:
-        """Time of the current step, in words."""
+        """Describe the time of the current step."""
         return f", {(self._steps - 1) // self._every * self._step_s:g} s after its initialisation"
 
     def _unread(self, messages: Sequence[Any]) -> Exception:
@@ -299,7 +299,7 @@ class FmuBlock:
 
 
 class _Shared:
-    """An instance, and the states of the blocks that share it."""
+    """An instance that several blocks share, with the state of each."""
 
     def __init__(self, instance: LocalInstance | IsolatedInstance) -> None:
         self.instance, self.lock = instance, threading.Lock()
@@ -325,7 +325,7 @@ class _Shared:
 
 
 def _revived(fmu: Fmu, setup: Any, parameters: Mapping[str, Any], content: bytes, held: Any, steps: int) -> FmuBlock:
-    """Return a block in a state that another process has saved."""
+    """Return a block with a state that another process has saved."""
     block = FmuBlock(fmu, setup, parameters)
 
     def restore(shared: _Shared) -> None:
@@ -377,7 +377,7 @@ class Fmu:
         self.PARAMETERS[ISOLATE] = {"unit": "s", "range": _ISOLATE_RANGE}
 
     def _matched(self, given: Mapping[str, Any], source: Source) -> tuple[list[Link], list[Link]]:
-        """Return the links of inputs and outputs, each by type."""
+        """Return the links of inputs and outputs, grouped by type."""
         about = self.description
         names = [*about.inputs, *about.outputs]
         for name in given:
@@ -401,7 +401,7 @@ class Fmu:
         return sorted(inputs, key=_type_of), sorted(outputs, key=_type_of)
 
     def fail(self, problem: str, *about: Any) -> Exception:
-        """Return the error for a problem of the FMU."""
+        """Return an error about the FMU."""
         return self.kind.fail(self.path.name, problem, *about)
 
     def from_vehicle(self, setup: Any, **parameters: Any) -> FmuBlock:
@@ -409,7 +409,7 @@ class Fmu:
         return FmuBlock(self, setup, parameters)
 
     def spec_for(self, setup: Any, parameters: Mapping[str, Any]) -> tuple[Spec, int]:
-        """Return the instance for a run, and the number of the caller's steps for which its outputs are held."""
+        """Return the instance for a run, and the number of steps for which its outputs are held."""
         about, every, step_s = self.description, 1, setup.timestep_s
         if self.kind.word == "driver" and self.interval_s is not None:
             every = max(1, round(self.interval_s / step_s))
@@ -447,7 +447,7 @@ def _type_of(link: Link) -> tuple[str, str]:
 
 
 def _grouped(links: Sequence[Link]) -> list[Group]:
-    """Return the groups of links that are ordered by type."""
+    """Split links, ordered by type, into groups."""
     groups = [(key, [link.variable for link in part]) for key, part in itertools.groupby(links, _type_of)]
     return [Group(*key, [v.reference for v in part], sum(v.size for v in part)) for key, part in groups]
 

@@ -1,4 +1,4 @@
-"""Kinematics and compliance of a car with a held chassis and its wheels on pads, measured as on a test bench.
+"""Kinematics and compliance rig: held chassis, wheels on pads.
 
 In: a car.
 Out: kinematic and compliance curves, their metrics and figures.

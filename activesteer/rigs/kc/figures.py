@@ -1,4 +1,4 @@
-"""Figures of kinematics and compliance of both wheels, drawn by matplotlib, an extra."""
+"""Figures of kinematics and compliance of both wheels."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _WIND_UP: Final[Row] = (
 
 
 def _moved(points: str, axis: int, *, outwards: bool = False) -> Callable[[Sweep], Array]:
-    """Return the motion of centre or contact point along an axis [mm]."""
+    """Return the motion of wheel centre or contact point along an axis [mm]."""
 
     def values(sweep: Sweep) -> Array:
         path = getattr(sweep, points)[..., axis]
@@ -133,7 +133,7 @@ def rear_camber_figure(result: KcResult) -> Figure:
 
 
 def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> list[Curve]:
-    """Return both wheels of an axle, the right one dashed, or only the left wheel as a thin grey line."""
+    """Return the left wheel of an axle as a thin grey line, or both wheels with the right one dashed."""
     if not both:
         return [Curve(x, values[:, 0], label, _GREY, "-", 0.9)]
     note = f", {label}" if label else ""
@@ -144,7 +144,7 @@ def _wheels(x: Array, values: Array, label: str = "", *, both: bool = True) -> l
 
 
 class Grid(NamedTuple):
-    """A figure with one row per quantity and one column per axle."""
+    """A figure with quantities as rows and axles as columns."""
 
     title: str
     rows: Sequence[Row]
@@ -265,7 +265,7 @@ def _steering(result: KcResult) -> Picture:
 
 
 def _rear_steering(result: KcResult) -> Picture:
-    """Angle, camber and half of the track of the left rear wheel over the travel of the screw in its toe link."""
+    """Angle, camber and half track of the left rear wheel versus the travel of its toe link screw."""
     design = result.curves["rear_steering"]
     travel = 1e3 * rear_screw_travel_m(result.measured.vehicle, design.x)
     middle_m = design.contact_m[design.zero, 2, 1]

@@ -1,4 +1,4 @@
-"""The car with its chassis held and its wheels on pads: equilibrium by Newton's method on the forces at rest.
+"""The car with a held chassis and wheels on pads, in equilibrium by Newton's method.
 
 The rig uses the model of the simulations. The search leaves out the six coordinates of the chassis and the rotation of
 the wheels. The chassis is held 1 m above its standing position, so that the tyre forces vanish and pads replace them.
@@ -52,7 +52,7 @@ MOUNT_ENDINGS: Final = ("_mount_x", "_mount_y", "_mount_z")
 
 
 class WheelPose(NamedTuple):
-    """Pose of a wheel in world axes, with its rotation about its own axle locked to the knuckle."""
+    """Pose of a wheel in world axes. Its rotation about the axle is locked to the knuckle."""
 
     centre_m: Array
     rotation: Array
@@ -61,7 +61,7 @@ class WheelPose(NamedTuple):
 
 @dataclass
 class Case:
-    """Loads and positions, in arrays by corner, that the rig imposes at one point of a sweep."""
+    """Imposed loads and positions at one point of a sweep, in arrays by corner."""
 
     hold: Hold = "centre"  # what the pads hold: heights of the wheel centres, heights of the contact points, or nothing
     # Height above the height in the standing car [m], shape (4,)
@@ -145,13 +145,13 @@ class HeldCar:
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def wheel(self, corner: int) -> WheelPose:
-        """Return the pose of a wheel, with the lowest point of the rigid circle as its contact point."""
+        """Return the pose of a wheel and its contact point, the lowest point of the rigid circle."""
         body = self._wheels[corner]
         centre = self.data.xpos[body].copy()
         return WheelPose(centre, self.data.xmat[body].reshape(3, 3).copy(), centre + self._down(corner))
 
     def _down(self, corner: int) -> Array:
-        """Return the vector from a wheel centre to its contact point, world axes, shape (3,) [m]."""
+        """Return the vector from a wheel centre to its contact point, in world axes [m]."""
         _, x, _, _, y, _, _, z, _ = self.data.xmat[self._wheels[corner]].tolist()
         across = math.sqrt(1.0 - z * z)
         scale = self._radii[corner] / across
@@ -183,7 +183,7 @@ class HeldCar:
         )
 
     def _command(self, case: Case) -> None:
-        """Command the servos, and start at their targets: further away they reach their torque limit."""
+        """Command the servos, and start at their targets, because far from them they would saturate."""
         model, data = self.model, self.data
         commands = [(self._steering_wheel, case.steering_wheel_rad)]
         commands += [(actuator, case.rear_steer_rad) for actuator in self._rear]

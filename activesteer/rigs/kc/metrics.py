@@ -1,4 +1,4 @@
-"""Metrics of the rig: the formulas of metrics.toml, and target bands."""
+"""Metrics of the rig, by the formulas of metrics.toml, and target bands."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Axle(NamedTuple):
         return self.measured.sweeps[name]
 
     def slope(self, sweep: str, values: Array, over: Array | None = None) -> Array:
-        """Return the slopes of the axle's wheels about static ride, within 15 mm, 1 kN or 100 N m, shape (2,)."""
+        """Return the slopes of the axle's wheels about static ride, shape (2,)."""
         x = self.sweep(sweep).x
         near = np.abs(x) <= _SMALL[sweep.split("_", maxsplit=1)[0]] * (1.0 + 1e-9)
         rows = values[near][:, self.wheels]
@@ -80,7 +80,7 @@ class Axle(NamedTuple):
         return np.sum(base * (rows - rows.mean(axis=0)), axis=0) / np.sum(base * base, axis=0)
 
     def mean_slope(self, sweep: str, quantity: str, axis: int | None = None) -> float:
-        """Return the mean slope of both wheels over the variable of the sweep."""
+        """Return the mean slope of both wheels versus the variable of the sweep."""
         values = getattr(self.sweep(sweep), quantity)
         return float(self.slope(sweep, values if axis is None else values[..., axis]).mean())
 
@@ -121,7 +121,7 @@ def _damper_ratio(axle: Axle) -> float:
 
 
 def _contact(axle: Axle, end: int) -> float:
-    """Travel at which a damper's length reaches one end of the slack range of its stops [mm]."""
+    """Travel at which a damper reaches an end of its free range between the stops [mm]."""
     model = axle.measured.vehicle.model
     limit = float(model.tendon_lengthspring[model.tendon(f"{axle.name[0]}l_damper").id, end])
     sweep = axle.sweep("parallel_travel")
@@ -144,7 +144,7 @@ def _roll_centre_height_by_force(axle: Axle) -> float:
 
 
 def roll_angle_rad(axle: Axle) -> Array:
-    """Roll angle of the body over the wheel centres in opposite travel, positive to the right, shape (n,)."""
+    """Roll angle of the body relative to the wheel centres in opposite travel, positive to the right."""
     sweep = axle.sweep("opposite_travel")
     centre = sweep.centre_m[:, axle.wheels]
     rise = sweep.travel_m[:, axle.wheels]
@@ -152,7 +152,7 @@ def roll_angle_rad(axle: Axle) -> Array:
 
 
 def _per_roll(axle: Axle, values: Array) -> float:
-    """Slope of values, shape (n,), over the roll angle, within 15 mm of travel."""
+    """Slope of values versus the roll angle, within 15 mm of travel."""
     roll = roll_angle_rad(axle)
     near = np.abs(axle.sweep("opposite_travel").x) <= SMALL_TRAVEL_M * (1.0 + 1e-9)
     return float(np.polyfit(roll[near], values[near], 1)[0])
@@ -186,7 +186,7 @@ def _left_right_difference(axle: Axle) -> float:
 
 
 def _support(axle: Axle, point: str) -> float:
-    """Slope of the path of a point in side view, times l/h, forwards per upwards, without springs [%]."""
+    """Slope of the path of a point in side view, forwards per upwards, times l/h [%]."""
     sweep = axle.sweep("parallel_kinematic")
     slopes = axle.slope("parallel_kinematic", getattr(sweep, point)[..., 0], over=sweep.centre_m[..., 2])
     return 100.0 * wheelbase_mm(axle) / _cg_height(axle) * float(slopes.mean())
@@ -200,7 +200,7 @@ def _brake_fraction(axle: Axle) -> float:
 
 
 def wheelbase_mm(axle: Axle) -> float:
-    """Distance of the contact points of front and rear axle along the standing car [mm]."""
+    """Distance between the front and rear contact points along the standing car [mm]."""
     sweep = axle.sweep("parallel_travel")
     x = sweep.contact_m[sweep.zero, :, 0]
     return 1e3 * float(x[:2].mean() - x[2:].mean())
@@ -221,7 +221,7 @@ def mean_steer_rad(axle: Axle, sweep: str = "steering_rolling") -> Array:
 
 
 def ratio_curve(axle: Axle) -> tuple[Array, Array]:
-    """Mean steer angle [rad] and the local overall steering ratio there: steering wheel angle over steer angle."""
+    """Mean steer angle of the front wheels [rad], and the local steering ratio."""
     mean = mean_steer_rad(axle)
     return mean, np.gradient(axle.sweep("steering_rolling").x, mean, edge_order=2)
 
@@ -233,7 +233,7 @@ def _steering_ratio(axle: Axle) -> float:
 
 
 def _ratio_at(axle: Axle, steer_deg: float) -> float:
-    """Total steering wheel angle over total mean steer angle, at a given mean steer angle."""
+    """Steering ratio at a mean steer angle, from the total angles."""
     mean = mean_steer_rad(axle)
     sides = [np.interp(sign * math.radians(steer_deg), mean, axle.sweep("steering_rolling").x) for sign in (1.0, -1.0)]
     return math.degrees(float(sides[0] - sides[1]) / 2.0) / steer_deg
@@ -246,7 +246,7 @@ def _rack_travel(axle: Axle) -> float:
 
 
 def _from_straight(axle: Axle) -> Array:
-    """Steer angles of both front wheels relative to straight ahead [rad], shape (n, 2)."""
+    """Steer angles of both front wheels from straight ahead [rad], shape (n, 2)."""
     sweep = axle.sweep("steering_rolling")
     steer = sweep.steer_rad[:, :2]
     return steer - steer[sweep.zero]
@@ -292,7 +292,7 @@ def _rear_steer_range(axle: Axle) -> float:
 
 
 def _per_side_force(axle: Axle, angle: str) -> float:
-    """Slope of an angle over a side force in phase that points inwards at the evaluated wheel, within 1 kN."""
+    """Slope of an angle versus a side force that points inwards at the wheel, within 1 kN."""
     slopes = axle.slope("lateral_in_phase", getattr(axle.sweep("lateral_in_phase"), angle))
     return 1e3 * math.degrees(float(np.mean(INWARDS[axle.wheels] * slopes)))
 
@@ -309,7 +309,7 @@ def _braking_recession(axle: Axle) -> float:
 
 
 def _bushes_Npmm(axle: Axle) -> Array:
-    """Stiffness of one of two equal bushes in series in each unloaded link, or nan without links [N/mm]."""
+    """Stiffness of one of two equal bushings in series in each unloaded link [N/mm]."""
     model = axle.measured.vehicle.model
     rates = []
     for index in range(model.ntendon):
@@ -320,7 +320,7 @@ def _bushes_Npmm(axle: Axle) -> Array:
 
 
 def _top_mount_Npmm(axle: Axle, direction: str) -> float:
-    """Stiffness of the left top mount, or nan for a rigid one [N/mm]."""
+    """Stiffness of the left top mount, nan for a rigid one [N/mm]."""
     model = axle.measured.vehicle.model
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{axle.name[0]}l_mount_{direction}")
     return 1e-3 * float(model.tendon_stiffness[tendon]) if tendon >= 0 else math.nan
@@ -392,7 +392,7 @@ FORMULAS: Final[dict[str, Callable[[Axle], float]]] = {
 
 @dataclass(frozen=True)
 class Definition:
-    """A characteristic: a table of metrics.toml, which explains the fields."""
+    """A characteristic, as declared in a table of metrics.toml."""
 
     name: str
     unit: str
@@ -404,7 +404,7 @@ class Definition:
     factor: float = 1.0
 
     def evaluate(self, axle: Axle) -> float:
-        """Return the value of an axle, in the unit."""
+        """Return the value of an axle, in its unit."""
         if self.mode:
             name = self.mode[0] if axle.name == "car" else f"{self.mode[0]}_{axle.name}"
             return getattr(axle.measured.modes.by_name[name], self.mode[1])

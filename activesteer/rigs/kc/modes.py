@@ -1,4 +1,4 @@
-"""Natural frequencies and damping of the standing car on its tyres, modelled as springs.
+"""Natural frequencies and damping ratios of the standing car on its tyres.
 
 The car is free. Each tyre is a spring at the contact point: vertically with its stiffness under static load, and
 sideways with the stiffness of its carcass, since it does not slide (a four-post rig). Along the car the wheels roll.
@@ -81,7 +81,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class Modes:
-    """The modes of body and wheels, and the lean of the car."""
+    """Modes of body and wheels, and roll and pitch gradients."""
 
     by_name: dict[str, Mode]  # the modes of `NAMES`
     body_roll_sliding: Mode  # body roll with tyres that slide sideways without resistance, as on air bearings
@@ -217,7 +217,7 @@ def _named(linear: _Linear) -> dict[str, Mode]:
 
 
 def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
-    """Return inertia and Jacobian rows of each motion that can name a mode."""
+    """Return inertia and Jacobian rows of each named motion."""
     model, data = linear.model, linear.data
     chassis = model.body("chassis").id
     along, about = linear.velocity_map(chassis, data.xipos[chassis])
@@ -237,7 +237,7 @@ def _motions(linear: _Linear) -> dict[str, tuple[float, Array]]:
 
 
 def _roll_gradient(linear: _Linear) -> float:
-    """Return the roll gradient, from the inertial forces of a lateral acceleration and the side forces of the tyres."""
+    """Return the roll gradient from inertial and side forces."""
     sideways = np.zeros(linear.free.size)
     sideways[linear.root + 1] = 1.0
     moved = np.linalg.lstsq(linear.stiffness, -linear.mass @ sideways, rcond=1e-13)[0]
@@ -245,7 +245,7 @@ def _roll_gradient(linear: _Linear) -> float:
 
 
 def _pitch_gradient(linear: _Linear, vehicle: Vehicle) -> float:
-    """Return the pitch gradient, from the inertial forces of a deceleration and the brake forces."""
+    """Return the pitch gradient from inertial and brake forces."""
     brakes = vehicle.parameters.brakes
     fraction = np.repeat([brakes.front_torque_Nm, brakes.rear_torque_Nm], 2)
     total = fraction.sum()

@@ -25,7 +25,7 @@ INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Sweep:
-    """One sweep of the rig, n points in increasing order of its variable.
+    """One sweep of the rig, with points in increasing order of its variable.
 
     Vehicle axes of the standing car: x forward, y left, z up, origin on the road below the middle of the front axle.
     Arrays have the shape (n, 4) or (n, 4, 3), by corner.
@@ -73,7 +73,7 @@ class Sweep:
 
 
 def _read(car: HeldCar) -> dict[str, Array]:
-    """Return one point of a sweep by the names of the fields of `Sweep`, with the rotations of the wheels."""
+    """Return one point of a sweep as the fields of `Sweep`, with the rotations of the wheels."""
     model, data = car.model, car.data
     poses = [car.wheel(corner) for corner in range(4)]
     wheel = model.joint("steering_wheel")
@@ -90,7 +90,7 @@ def _read(car: HeldCar) -> dict[str, Array]:
 
 
 def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float, Case]) -> Sweep:
-    """Measure the points of a sweep, from zero outwards to either side."""
+    """Measure the points of a sweep, from zero outwards in both directions."""
     points: dict[float, dict[str, Array]] = {}
     for side in (sorted(x for x in cases if x >= 0.0), sorted((x for x in cases if x < 0.0), reverse=True)):
         car.reset()
@@ -115,7 +115,7 @@ def run(car: HeldCar, title: str, variable: str, unit: str, cases: Mapping[float
 
 @dataclass(frozen=True)
 class SteeringAxis:
-    """A steering axis, and its distances from the wheel of the standing car."""
+    """A steering axis, and its offsets from the wheel of the standing car."""
 
     point_m: Array  # point of the axis at the height of the contact point, vehicle axes, shape (3,)
     direction: Array  # unit vector along it, upwards, shape (3,)
@@ -131,7 +131,7 @@ class SteeringAxis:
 
 
 def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
-    """Return the axis of the screw motion that takes a wheel from one position to another.
+    """Return the screw axis of the motion of a wheel between two positions.
 
     Args:
         right: The wheel steered slightly to the right, vehicle axes.
@@ -250,13 +250,13 @@ def _sweeps(
 
 
 def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:
-    """Return the lengthening of the left toe link by its screw at angles of the actuators [m], shape (n,)."""
+    """Return the extension of the left toe link by its screw at given actuator angles [m]."""
     address = int(vehicle.model.actuator_actadr[vehicle.model.actuator("rl_steer").id])
     return np.array([vehicle.actuators.rear_states_at(float(angle))[address] for angle in angles_rad])
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:
-    """Return steering wheel angles, denser about straight ahead, to the first lock of steering wheel or rack."""
+    """Return steering wheel angles up to the first lock, denser about straight ahead."""
     model = vehicle.model
     rack = float(model.jnt_range[model.joint("rack").id, 1])
     per_angle = vehicle.rack_per_steering_wheel_m

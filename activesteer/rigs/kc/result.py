@@ -84,12 +84,12 @@ class KcResult:
         return tuple(entry for entry in self.metrics if entry.inside is False)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the metrics as JSON values (name, axle, value, unit, band, inside, source), null if missing."""
+        """Return the metrics as JSON values."""
         names = ("name", "axle", "value", "unit", "band", "inside", "source")
         return {"metrics": [{name: getattr(entry, name) for name in names} for entry in self.metrics]}
 
     def table(self) -> str:
-        """Return the metrics as text of 80 columns, a line each, with their target bands if there are any."""
+        """Return the metrics as lines of 80 columns, with their target bands."""
         band = f"{'target band':>14}" if self.targeted else ""
         lines = [f"{'metric':31} {'axle':5} {'value':>7} {'unit':9} {band}".rstrip()]
         for entry in self.metrics:

@@ -31,7 +31,7 @@ confidence interval draws, so a half needs more than 20."""
 
 
 class Index(NamedTuple):
-    """An index of one factor."""
+    """Sensitivity index of one factor."""
 
     factor: str
     name: str  # `S1`, `ST`, or `mu*`
@@ -43,7 +43,7 @@ class Index(NamedTuple):
 def indices(
     kind: str, factors: Sequence[Factor], columns: Mapping[str, Sequence[object]], values: NDArray[np.float64]
 ) -> list[Index]:
-    """Return the indices of one metric of one controller in one manoeuvre with one vehicle.
+    """Return the sensitivity indices of one metric in one manoeuvre with one vehicle and controller.
 
     Columns and values are in the order of the design. There are no indices for a grid or a list, for failed runs in a
     design that needs all of them, or for a metric that does not vary.
@@ -109,7 +109,7 @@ Point = tuple[Any, ...]
 
 
 def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
-    """Return the factors without effect: a change of one of them leaves every metric bit-identical.
+    """Return the factors whose change leaves every metric of every run bit-identical.
 
     Rows that differ in one factor only are compared. If there are none for a factor, as in a random sample, the first
     sample is driven again with the ends of the factor's range.
@@ -148,14 +148,14 @@ def _has_effect(plan: Plan, number: int, known: Mapping[Place, Mapping[Point, st
 
 
 def _others(factor: Factor, number: int, point: Point) -> Iterator[Point]:
-    """Yield the point with the other values of a factor."""
+    """Yield the other values of a factor at a point."""
     for value in factor.extremes:
         if value != point[number]:
             yield (*point[:number], value, *point[number + 1 :])
 
 
 def _driven(plan: Plan, place: Place, point: Point) -> str | None:
-    """Return the metrics of a run with these values, or None if it is incomplete."""
+    """Return the metrics of a run with these values, None if it is incomplete."""
     study = replace(plan.settings.study, recordings="none", curves=(), claims=False)
     settings = replace(plan.settings, study=study, folder=None)
     # A table may hold a whole number of the study as a float.
@@ -179,7 +179,7 @@ def _place(plan: Plan, row: Row) -> Place:
 
 
 def _metrics(row: Row, keys: Sequence[str]) -> str:
-    """Return all metrics of a row in a form that is equal for identical runs only."""
+    """Return all metrics of a row as a key, equal only for identical runs."""
     others = {*IDENTITY, *OUTCOME, *keys}
     found = sorted((name, value) for name, value in row.items() if name not in others and isinstance(value, float))
     return repr([(name, value) for name, value in found if not name.startswith("claim")])

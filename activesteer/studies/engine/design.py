@@ -1,4 +1,4 @@
-"""Design of a study: the combinations of factor values as a grid, a list of cases, or a sample."""
+"""Design of a study: combinations of factor values from a grid, a list of cases, or a sample."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class DesignTable:
 
 @dataclass(frozen=True)
 class Samples:
-    """Combinations, stored as columns so that a million of them need little memory."""
+    """Combinations of factor values, stored as columns to save memory."""
 
     # Key -> value in every combination; None for a key that a case of a list does not name
     columns: dict[str, list[Value]]
@@ -115,7 +115,7 @@ def cases(given: Iterable[Mapping[str, Any]]) -> Samples:
 
 
 def read_cases(path: Path) -> Samples:
-    """Read a list of cases from a CSV file with keys in its header, where an empty cell leaves a key unchanged."""
+    """Read a list of cases from a CSV file with keys in its header. Empty cells set nothing."""
 
     def fail(problem: str, line: int, key: str | None = None) -> StudyError:
         return StudyError(problem, file=path.name, line=line, key=key)
@@ -142,7 +142,7 @@ def read_cases(path: Path) -> Samples:
 
 
 def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool, source: Source) -> DesignTable:
-    """Return the design with its kind, after a check that its parts do not contradict each other."""
+    """Complete and check a design."""
     all_grids = all(factor.kind == "grid" for factor in factors)
     kind = table.kind or ("list" if has_cases else "grid" if all_grids else "sobol")
     where = ("design", "kind")
@@ -175,7 +175,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
 
 
 def _check_size(factors: Sequence[Factor], points: int, source: Source) -> None:
-    """Reject a design with too many combinations before any combination is made."""
+    """Reject a design with too many combinations before they are created."""
     sizes = [len(factor.values) for factor in factors if factor.kind == "grid"]
     count = math.prod(sizes) * points
     if count > MAX_SAMPLES:

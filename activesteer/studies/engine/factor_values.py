@@ -1,4 +1,4 @@
-"""Values of a sample for a manoeuvre and a vehicle, and their plausibility: the distance from the files."""
+"""Values of factors for a manoeuvre and a vehicle, and the plausibility of a setting."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from activesteer.studies.engine.study_file import StudyFile, label_of
 
 
 class FactorValues:
-    """Conversion of sample values to overrides, which resolves each pair of manoeuvre and vehicle once."""
+    """Conversion of sample values to overrides, with each pair of manoeuvre and vehicle resolved once."""
 
     def __init__(self, study: StudyFile) -> None:
         """Prepare the conversion for a study."""
@@ -49,7 +49,7 @@ class FactorValues:
                     raise study.source.fail(place, f"is not another range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the overrides of a run for the keys that vary in its manoeuvre, None for the value of the files."""
+        """Return the overrides of a run, None for a key that keeps the value of the files."""
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
         # In the order of the file, in which a factor follows the one to which it is relative.
@@ -71,7 +71,7 @@ class FactorValues:
         return found
 
     def _nominal_of(self, maneuver: int, vehicle: int) -> dict[str, Any]:
-        """Return the values of the files for the relative factors, by key."""
+        """Return the values in the files of the relative factors, by key."""
         place = maneuver, vehicle
         if place not in self._nominal:
             study = self.study
@@ -98,7 +98,7 @@ _UNUSUAL: Final = 0.8
 
 
 class Plausibility(StrEnum):
-    """Plausibility of a setting in words."""
+    """Plausibility of a setting as a word."""
 
     ORDINARY = "ordinary"
     UNUSUAL = "unusual"
@@ -113,7 +113,7 @@ class Prior:
     """
 
     def __init__(self, study: StudyFile) -> None:
-        """Find the nominal values: from the files, and no change for factors that are relative to them."""
+        """Find the nominal values: the values of the files, or no change for relative factors."""
         self._searched = [factor for factor in study.factors if not factor.values]
         self.nominal: dict[str, Any] = {}
         for factor in study.factors:
@@ -156,7 +156,7 @@ class Prior:
         return float(np.sqrt(np.mean(np.square(list(self.distances(values).values()) or [0.0]))))
 
     def plausibility(self, values: Mapping[str, Any]) -> Plausibility:
-        """Return the plausibility of a setting in words."""
+        """Return the plausibility of a setting."""
         if any(abs(distance) > 1.0 + 1e-9 for distance in self.distances(values).values()):
             return Plausibility.EXTREME
         size = self.implausibility(values)
@@ -166,5 +166,5 @@ class Prior:
 
 
 def _linear(factor: Factor, value: float) -> float:
-    """Return a value on the scale on which its range is even."""
+    """Return a value on the scale of its range, linear or logarithmic."""
     return math.log(max(value, 1e-300)) if factor.kind == "log_uniform" else float(value)

@@ -1,4 +1,4 @@
-"""Factors of a study: keys of manoeuvre or vehicle and the values that they take."""
+"""Factors of a study: keys of manoeuvre or vehicle, and their values."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class FactorTable:
 
 @dataclass(frozen=True)
 class Factor(FactorTable):
-    """A factor: a key and its checked table, with the ends of a normal distribution."""
+    """A factor: a key with its checked table."""
 
     key: str = ""  # dotted key, as for `--set`
 
@@ -63,17 +63,17 @@ class Factor(FactorTable):
 
     @property
     def values(self) -> tuple[Value, ...]:
-        """Return the values of a grid or a choice, and none for a range."""
+        """Return the values of a grid or a choice, empty for a range."""
         return self.grid or self.choice
 
     @property
     def low(self) -> float:
-        """Return the lower end of a range, 0 without one."""
+        """Return the lower end of a range, 0 without a range."""
         return self._ends[0]
 
     @property
     def high(self) -> float:
-        """Return the upper end of a range, 0 without one."""
+        """Return the upper end of a range, 0 without a range."""
         return self._ends[1]
 
     @property
@@ -81,7 +81,7 @@ class Factor(FactorTable):
         return self.uniform or self.log_uniform or self.truncate or (0.0, 0.0)
 
     def acts(self, values: Mapping[str, Value]) -> bool:
-        """Return whether the factor varies with these values of the others."""
+        """Return whether the factor varies for given values of the other factors."""
         return all(values.get(other) in wanted for other, wanted in self.conditions.items())
 
     @property
@@ -108,7 +108,7 @@ class Factor(FactorTable):
 
     @property
     def extremes(self) -> tuple[Value, ...]:
-        """Return the extreme values, or all values if they have no order."""
+        """Return the extreme values, or all values of an unordered factor."""
         return self.values or (self.low, self.high)
 
     def to_table(self) -> dict[str, Any]:
@@ -190,5 +190,5 @@ def _is_number(value: object) -> bool:
 
 
 def is_plain(value: object) -> bool:
-    """Return whether a value can be varied: a number, a text or a truth value."""
+    """Return whether a value can be varied: a number, a string or a boolean."""
     return isinstance(value, (bool, str)) or _is_number(value)

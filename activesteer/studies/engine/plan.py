@@ -1,4 +1,4 @@
-"""Plan of a study: all runs in their order, with every key checked before anything is driven."""
+"""Plan of a study: the ordered list of its runs, with all keys checked before the first run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LABELS: Final = ("name", "title")
 
 
 class Plan:
-    """The runs of a study: for each manoeuvre and vehicle every sample, and for each sample every controller.
+    """The runs of a study: every sample in each manoeuvre and vehicle, and every controller in each sample.
 
     Attributes:
         study: The study.
@@ -62,7 +62,7 @@ class Plan:
         return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
-        """Return indices of manoeuvre and vehicle with overrides, for each combination of texts that can occur."""
+        """Yield indices of manoeuvre and vehicle with overrides, for each combination of string values."""
         study = self.study
         places = list(itertools.product(range(len(study.maneuvers)), range(len(study.vehicles))))
         for samples in self.samples:
@@ -90,7 +90,7 @@ class Plan:
         return self.request_with(run, sample, (maneuver, vehicle, controller), samples[sample])
 
     def request_with(self, run: int, sample: int, place: tuple[int, int, int], factors: dict[str, Any]) -> Request:
-        """Return a run with other values of the keys."""
+        """Return a run with other values of some keys."""
         overrides = self.study.overrides | self._values.overrides(*place[:2], factors)
         return Request(run, sample, *place, factors, overrides)
 
@@ -166,7 +166,7 @@ def _resolved(
 def _described(
     factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
 ) -> list[dict[str, Any]]:
-    """Return the inputs of a run at each value of a key, with the other keys as in the first sample if possible."""
+    """Return the inputs of a run at each value of a key, with the other keys from the first sample if possible."""
     study = factor_values.study
     conditions = next((factor.conditions for factor in study.factors if factor.key == key), {})
     needed = {other: wanted[0] for other, wanted in conditions.items()}
@@ -196,7 +196,7 @@ def _check_curves(study: StudyFile, scenario: Scenario) -> None:
 
 
 def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[Any]]:
-    """Return the extreme values of each key, all values if they have no order, or None where the key is not set."""
+    """Return the extreme values of each key, or all values of an unordered key."""
     if study.case_list is None:
         return {factor.key: list(factor.extremes) for factor in study.factors}
     found: dict[str, list[Any]] = {}
@@ -211,7 +211,7 @@ def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[An
 
 
 def _leaves(scenario: Scenario) -> dict[str, Any]:
-    """Return everything that a run depends on, by dotted key."""
+    """Return all inputs of a run by dotted key."""
     return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
 
 
@@ -231,7 +231,7 @@ def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
 
 
 def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
-    """Return True if a value affects any run: a gain needs its controller, a preview needs a path."""
+    """Return whether a key affects any run: a gain needs its controller, a preview needs a path."""
     part, first, *rest = [*leaf.split("."), "", ""]
     follows_path = scenario.maneuver.course is not None
     if part == "files":
@@ -249,7 +249,7 @@ def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
 
 
 def task_size(runs: int, controllers: int, in_flight: int) -> int:
-    """Return the number of runs per task: 8 to 64, whole samples, and enough tasks for all workers to end together."""
+    """Return the number of runs per task, from 8 to 64 and in complete samples."""
     wanted = int(np.clip(runs // (8 * in_flight), 8, 64))
     if runs < 8 * in_flight:
         wanted = max(1, runs // in_flight)

@@ -1,4 +1,4 @@
-"""Report of a study, with the figure of a search."""
+"""Report of a study, and figure of a search."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Places = NDArray[np.int64]
 
 
 def write_report(folder: str | os.PathLike[str]) -> Path:
-    """Write report.html into a study's folder from its finished runs."""
+    """Write report.html into the folder of a finished study."""
     home = Path(folder)
     store = Store(home, ())
     progress = store.progress()
@@ -58,7 +58,7 @@ def write_report(folder: str | os.PathLike[str]) -> Path:
 
 
 def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> Page:
-    """Return the page: the runs, then the plots of `study.js`, then the factors and the file of the study."""
+    """Return the page with runs, plots, factors and study file."""
     title, data = study.title or name, _data(study, table)
     counts = ", ".join(f"{number} {status}" for status, number in progress.by_status.items())
     parts = (("Manoeuvres", "maneuver"), ("Vehicles", "vehicle"), ("Controllers", "controller"))
@@ -86,12 +86,12 @@ def _page(study: StudyFile, progress: Progress, table: pa.Table, name: str) -> P
 
 
 def _words(name: str) -> str:
-    """Return a name of the package in words; a file keeps its name."""
+    """Return a name of the package in words, or the name of a file unchanged."""
     return name if "." in name else name.replace("_", " ")
 
 
 def _finding(data: Mapping[str, Any]) -> list[Text]:
-    """Name the numeric factor with the largest rank correlation with the first metric, for each controller."""
+    """Name the factor with the largest rank correlation with the first metric, for each controller."""
     rows, names, told = data["rows"], data["by_group"][0], []
     name = next((name for name in (*_FIRST, *names) if name in names), None)
     for place, controller in enumerate(data["controllers"] if name else ()):
@@ -108,7 +108,7 @@ def _finding(data: Mapping[str, Any]) -> list[Text]:
 
 
 def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
-    """Return the content of the page as JSON values, in units for display."""
+    """Return the data of the page as JSON values, in display units."""
     others = (*IDENTITY, *OUTCOME, *study.keys)
     metrics = [name for name in table.column_names if name not in others and not name.startswith(CURVE)]
     values = {name: table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in metrics}
@@ -140,20 +140,20 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
 
 
 def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
-    """Return the different texts of a column in order of occurrence, and the index of each row's text."""
+    """Return the distinct values of a column in order of occurrence, and the index of each row's value."""
     encoded = column.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
 
 
 def _shown_rows(table: pa.Table) -> Places:
-    """Return the rows of evenly spread, complete samples, so that paired runs stay together."""
+    """Return the rows of evenly spread, complete samples, which keep paired runs together."""
     samples = table["sample"].to_numpy()
     every = -(-table.num_rows // _SHOWN_ROWS)
     return np.flatnonzero(samples % every == 0)
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
-    """Return the values of a factor, None in manoeuvres where it does not vary."""
+    """Return the values of a factor, None in manoeuvres in which it does not vary."""
     named = [factor.maneuvers for factor in study.factors if factor.key == key]
     values, maneuvers = rows[key].to_pylist(), rows["maneuver"].to_pylist()
     if not all(named):
@@ -261,7 +261,7 @@ def _paired(
 
 
 def _heat(study: StudyFile, table: pa.Table, rows: Sequence[Places], parts: Sequence[Array]) -> dict[str, Any] | None:
-    """Return the means over the first two grids, by controller, averaged over all values of further grids."""
+    """Return the means over the grid of the first two factors, by controller."""
     grids = [factor for factor in study.factors if factor.kind == "grid"][:2]
     if len(grids) < 2:
         return None
@@ -294,7 +294,7 @@ def _indices(study: StudyFile, points: Sequence[Mapping[str, Any]], parts: Seque
 
 
 def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) -> list[list[Any]]:
-    """Return the runs with the largest and the smallest magnitudes: run, value, and its command line."""
+    """Return the runs with the largest and the smallest magnitudes, each with value and command line."""
     good = np.flatnonzero(np.isfinite(part))
     if len(good) > 2 * _EXTREMES:
         good = good[np.argpartition(np.abs(part[good]), (_EXTREMES - 1, len(good) - _EXTREMES))]
@@ -307,7 +307,7 @@ def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) 
 
 
 def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
-    """Return the command line that drives and replays a run, or empty if its manoeuvre or vehicle has no file."""
+    """Return the command line that drives and replays a run, empty if its manoeuvre or vehicle has no file."""
     study = factor_values.study
     given = {}
     place = {}
@@ -324,7 +324,7 @@ def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
 
 
 def _json(column: Array) -> list[float | None]:
-    """Return numbers for the page: five digits, and None for a value that is not finite."""
+    """Round numbers to five digits for the page, with None for values that are not finite."""
     return [float(f"{value:.5g}") if np.isfinite(value) else None for value in column.tolist()]
 
 
@@ -334,7 +334,7 @@ _KEPT, _BROKEN, _GREY = "#5b9fd0", "#b3261e", "0.6"
 
 
 def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
-    """Draw a search into the folder of its command, and return the files, or none if no set could be judged."""
+    """Draw the figure of a search into its folder, and return the files."""
     if not found.trials:
         return []
     if found.goal is Goal.VIOLATE:
@@ -345,7 +345,7 @@ def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
 
 
 def _front(found: Tuning) -> Panel:
-    """Return two objectives versus each other, one versus the sets, or the statements versus the implausibility."""
+    """Return the figure of two objectives, of one objective over the sets, or of statements over implausibility."""
     names = list(found.trials[0].objectives)
     x, y = names[:2] if len(names) > 1 else ("set", *names, "statements that hold")[:2]
     if found.goal is Goal.SATISFY:
@@ -369,7 +369,7 @@ def _front(found: Tuning) -> Panel:
 
 
 def _violations(found: Tuning) -> Picture:
-    """Return the fall of the margin, and the places of violations."""
+    """Return the figure of the falling margin and of the violations."""
     ((name, _),) = found.trials[0].margins.items()
     margins = np.array([trial.margins[name] for trial in found.trials])
     judged = np.abs(margins) < 0.99e6  # others define no metric
@@ -403,7 +403,7 @@ def _violations(found: Tuning) -> Picture:
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation, or 0 for a constant."""
+    """Return Spearman's rank correlation, 0 for a constant."""
     if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
     return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])

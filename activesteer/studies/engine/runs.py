@@ -1,4 +1,4 @@
-"""Runs of a study: one task, and its results."""
+"""Runs of a study: tasks and their results."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _of_bytes(value: object) -> str:
 
 @functools.cache
 def source_digest() -> str:
-    """Return the hash of the sources that results depend on, which changes with every edit."""
+    """Return the hash of the sources that affect results."""
     package = Path(__file__).parents[2]
     found = {}
     for part in _DECIDING:
@@ -85,7 +85,7 @@ def versions() -> dict[str, str]:
 
 
 def deciding_versions() -> dict[str, str]:
-    """Return the versions that the identity of a run depends on."""
+    """Return the versions that are part of the identity of a run."""
     return {key: versions()[key] for key in ("activesteer", "source", "mujoco")}
 
 
@@ -100,7 +100,7 @@ def controller_digest(controller: str) -> str:
 
 
 def run_id(scenario: Scenario, controller: str, seed: int, timestep_s: float) -> str:
-    """Return the identity of a run, equal for two runs exactly if all their inputs are equal."""
+    """Return the identity of a run, equal only for equal inputs."""
     parts = {
         "scenario": describe(scenario) | {"overrides": None},
         "files": scenario.files,
@@ -117,7 +117,7 @@ _VERSION: Final = "version of "
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that all runs of a study share, small because every task carries them."""
+    """Settings of all runs of a study, kept small because every task carries them."""
 
     study: StudyFile  # the study without its cases and searches
     maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre
@@ -133,7 +133,7 @@ class Settings:
 
 
 class Request(NamedTuple):
-    """Request for one run: its manoeuvre, car, sample and controller."""
+    """Request for one run, by manoeuvre, car, sample and controller."""
 
     run: int
     sample: int
@@ -157,7 +157,7 @@ def present_inputs(settings: Settings) -> dict[str, str]:
 
 
 def scenario_of(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario for these indices of manoeuvre and vehicle."""
+    """Return the scenario of a pair of manoeuvre and vehicle."""
     controllers = [controller for _, controller in settings.controllers]
     return resolve(
         settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.study.driver, controllers
@@ -176,7 +176,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
 
 
 def differences(settings: Settings) -> str:
-    """Return a description of the differences from the start of the study, empty if there are none."""
+    """Describe the differences from the start of the study, empty without any."""
     try:
         here = present_inputs(settings)
     except ActiveSteerError as error:
@@ -196,7 +196,7 @@ def prepare(workers: Workers, settings: Settings) -> None:
 
 
 def prepare_worker(settings: Settings) -> str:
-    """Compile the native code, and return the reason why this machine cannot drive the runs, or an empty text."""
+    """Compile the native code, and return the reason why this machine cannot drive the runs, empty if it can."""
     if problem := differences(settings):
         return problem
     install_native_forces()
@@ -277,7 +277,7 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
 
 
 def _give_memory_back() -> None:
-    """Return free memory to the system, because the C library would keep it in more and more fragments."""
+    """Return free memory to the system. The C library would otherwise fragment it."""
     with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -286,14 +286,14 @@ _seen: dict[str, str] = {}
 
 
 def _problem(key: str, settings: Settings) -> str:
-    """Check once per process that files and versions are unchanged since the start of the study."""
+    """Check, once per process, that files and versions are unchanged since the start of the study."""
     if key not in _seen:
         _seen[key] = differences(settings)
     return _seen[key]
 
 
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
-    """Drive the runs of one sample: the same car on the same road with one controller after the other."""
+    """Drive the runs of one sample: one car on one road with each controller in turn."""
     first = requests[0]
     place = first.maneuver, first.vehicle, first.overrides
     try:
@@ -361,7 +361,7 @@ def _is_kept(patterns: tuple[str, ...], name: str) -> bool:
 
 
 def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, float]:
-    """Return the verdicts (1 if a claim of the paper holds, else 0) and distances, or empty if a run is missing."""
+    """Return verdicts and distances of the paper's claims, empty if a run is missing."""
     try:
         claims = SCENARIOS[maneuver](recordings)
     except (KeyError, ActiveSteerError):

@@ -1,4 +1,4 @@
-"""Folder of a study: the study, the finished runs as tables of rows, and finally all of them in one file.
+"""Folder of a study: the study file, tables of finished runs, and finally one table of all runs.
 
     DIR/study.toml         the study as it runs, with absolute paths
     DIR/environment.json   hash of everything that decides the result, versions, machine
@@ -56,7 +56,7 @@ def table_of(rows: Sequence[Row], factors: Sequence[str]) -> pa.Table:
 
 
 def _factor_column(values: Sequence[Any]) -> pa.Array:
-    """Return a column of numbers, texts or truth values. Other values become JSON."""
+    """Return a column of numbers, strings or booleans. Other values become JSON."""
     try:
         numbers = any(isinstance(value, float) for value in values)
         plain = [float(value) if numbers and value is not None else value for value in values]
@@ -68,7 +68,7 @@ def _factor_column(values: Sequence[Any]) -> pa.Array:
 
 
 def joined(tables: Sequence[pa.Table]) -> pa.Table:
-    """Return the rows of all parts, with a factor as text if it is a number only in some parts."""
+    """Return the rows of all tables, with a factor as strings if it is not numeric in all of them."""
     kinds: dict[str, set[pa.DataType]] = {}
     for field in (field for table in tables for field in table.schema if not pa.types.is_null(field.type)):
         kinds.setdefault(field.name, set()).add(field.type)
@@ -104,17 +104,17 @@ class Progress(NamedTuple):
 
 
 class Store:
-    """A study's folder, held by one process at a time."""
+    """A study's folder, locked by one process."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Prepare the store, which `opened` opens."""
+        """Prepare the store; `opened` opens it."""
         self.folder = folder
         self._factors = tuple(factors)
         self._parts = folder / "parts"
 
     @contextlib.contextmanager
     def opened(self, study_toml: str, identity: str, total: int) -> Iterator[Store]:
-        """Make the folder, or resume the study in it."""
+        """Create the folder, or resume the study in it."""
         make_folder(self._parts, StudyError)
         with locked(self.folder / LOCK):
             about = {"digest": identity, "runs": total, "versions": versions(), "platform": platform.platform()}
@@ -131,7 +131,7 @@ class Store:
             yield self
 
     def missing(self, total: int) -> list[range]:
-        """Return the runs without a row, as ranges of their numbers."""
+        """Return the numbers of the missing runs, as ranges."""
         if (self.folder / RESULTS).exists():
             return []
         found, begin = [], 0
@@ -148,7 +148,7 @@ class Store:
             pq.write_table(table_of(rows, self._factors), path)
 
     def join(self) -> Path:
-        """Join all parts to one file in the order of the runs, and delete the parts."""
+        """Join all tables into one file in the order of the runs, and delete them."""
         target = self.folder / RESULTS
         if not target.exists():
             # In one piece, so that the file does not depend on the division of the work.
@@ -185,7 +185,7 @@ class Store:
             write_text(self.folder / _WITHOUT_EFFECT, json.dumps(factors) + "\n", StudyError)
 
     def without_effect(self) -> list[str]:
-        """Return the stored factors of `note_without_effect`, or none if the file is damaged."""
+        """Return the stored factors of `note_without_effect`, empty if the file is damaged."""
         with contextlib.suppress(OSError, ValueError):
             found = json.loads((self.folder / _WITHOUT_EFFECT).read_text(encoding="utf-8"))
             return [str(key)[:_KEY_CHARACTERS] for key in found] if isinstance(found, list) else []

@@ -1,4 +1,4 @@
-"""A study from its file to its table: many runs on several workers, interruptible and resumable."""
+"""A study from its file to its results: many runs on several workers, which can be interrupted and resumed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def study(
     limit: int | None = None,
     progress: Callable[[StudyProgress], None] | None = None,
 ) -> pa.Table:
-    """Drive a study, or its missing runs.
+    """Drive a study, or the missing runs of a study.
 
     With more than one job, the runs are made in newly started processes: a script that calls this function needs
     `if __name__ == "__main__":`.
@@ -107,7 +107,7 @@ def study(
 
 
 def _warn_of_patterns(study_file: StudyFile, table: pa.Table) -> None:
-    """Log each pattern of `metrics` that matches no metric of the runs made so far."""
+    """Log each pattern of `metrics` that has matched no metric so far."""
     if not table.num_rows or Status.OK not in table.column("status").to_pylist():
         return
     metrics = set(table.column_names) - {*IDENTITY, *OUTCOME, *study_file.keys}
@@ -152,7 +152,7 @@ def _drive_all(
 
 
 def _tasks(plan: Plan, missing: Iterable[range], size: int, limit: int | None) -> Iterator[list[Request]]:
-    """Yield groups of runs that end at multiples of the size, so that a sample stays together."""
+    """Yield groups of runs that contain whole samples."""
     left = len(plan) if limit is None else limit
     for span in missing:
         begin = span.start

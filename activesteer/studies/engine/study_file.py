@@ -1,4 +1,4 @@
-"""Study files: manoeuvres, drivers, cars, factors, and the results to keep."""
+"""Study files: manoeuvres, drivers, cars, factors, and stored results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def label_of(item: FileOrTable) -> str:
 
 @dataclass(frozen=True)
 class _Common:
-    """Keys that a study takes over from its file."""
+    """Keys that a study copies from its file."""
 
     maneuvers: tuple[Any, ...]  # names, paths or tables of manoeuvres
     controllers: tuple[str, ...] = ("none",)  # names or files of controllers
@@ -62,7 +62,7 @@ class _Common:
 
 @dataclass(frozen=True)
 class StudyFile(_Common):
-    """A study as in its file, with absolute paths."""
+    """A study as declared in its file, with absolute paths."""
 
     factors: tuple[Factor, ...] = ()
     design: DesignTable = DesignTable()
@@ -70,7 +70,7 @@ class StudyFile(_Common):
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:
-        """Return the combinations: one set for all controllers if they are paired, else one for each."""
+        """Return the combinations, one set for all controllers if paired, else one for each."""
         if self.case_list is not None:
             return (self.case_list,)
         # A grid is the same for all controllers anyway.
@@ -108,7 +108,7 @@ class StudyFile(_Common):
         return table | {"design": design}
 
     def to_toml(self) -> str:
-        """Return the study as the text of a study file."""
+        """Return the study as the content of a study file."""
         table = self.to_table()
         lines = [f"{key} = {toml_value(value)}" for key, value in table.items() if not isinstance(value, dict)]
         for name, inner in table.items():
@@ -136,7 +136,7 @@ class StudyTable(_Common):
 
 
 def read_study(given: FileOrTable | StudyFile, search: str = "") -> StudyFile:
-    """Read a study file and check everything that needs neither manoeuvres nor vehicles."""
+    """Read a study file, and check it without its manoeuvres and vehicles."""
     if isinstance(given, StudyFile):
         return given
     if isinstance(given, Mapping):
@@ -220,7 +220,7 @@ def _recordings(value: Any, source: Source) -> str | int:
 
 
 def _located(item: FileOrTable, folder: Path) -> FileOrTable:
-    """Return a name unchanged, and a path as absolute, from the study file's folder."""
+    """Return an absolute path from the study file's folder, or a name unchanged."""
     if isinstance(item, Mapping):
         return item
     text = os.fspath(item)
@@ -229,7 +229,7 @@ def _located(item: FileOrTable, folder: Path) -> FileOrTable:
 
 
 def _located_code(item: Any, folder: Path) -> Any:
-    """Return the same for a specification such as `my_file.py:MyController?gain=2`."""
+    """Make the path in a specification such as `my_file.py:MyController?gain=2` absolute."""
     name, mark, parameters = ("", "", "") if isinstance(item, Mapping) else item.partition("?")
     path, colon, class_name = name.rpartition(":")
     if not colon:

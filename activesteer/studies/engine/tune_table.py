@@ -1,4 +1,4 @@
-"""The table [tune] of a study file, and the judgement of sets of values by it.
+"""The table [tune] of a study file, and the judgement of sets of values.
 
 The table has one goal: `minimise` objectives, `satisfy` as many statements as possible, or `violate` a requirement.
 They are expressions over the metrics of the runs of a set, see `analysis.requirement`.
@@ -103,7 +103,7 @@ def read_table(study: StudyFile) -> TuneTable:
 
 
 def _in_one_line(value: Any) -> Any:
-    """Return a text, or a table of texts, with blanks in place of the line breaks."""
+    """Replace line breaks by blanks in a string, or in a table of strings."""
     if isinstance(value, Mapping):
         return {key: _in_one_line(item) for key, item in value.items()}
     return " ".join(value.split()) if isinstance(value, str) else value
@@ -116,7 +116,7 @@ def _is_in(factor: Factor, value: Any) -> bool:
 
 
 class Judgement(NamedTuple):
-    """Judgement of a set: the quantities to minimise, and the margins of its statements and constraints, by name."""
+    """Judgement of a set: its objectives, and the margins of statements and constraints by name."""
 
     objectives: list[float]
     margins: dict[str, float]
@@ -134,7 +134,7 @@ class Judge:
     """
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
-        """Read the expressions of a table, with `controller` for the examined controller."""
+        """Parse the expressions of a table, with `controller` as the examined controller."""
         study, shared, self._examined = plan.study, plan.settings, examined
         controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
@@ -155,7 +155,7 @@ class Judge:
         self.prior = Prior(study) if table.satisfy else None
 
     def judged(self, rows: Sequence[Row], values: Mapping[str, Any]) -> Judgement | None:
-        """Judge a set by the rows of its runs, or None if it cannot be judged."""
+        """Judge a set from the rows of its runs, or return None if that is impossible."""
         whole = [row["status"] == Status.OK for row in rows]
         if not any(whole) or (self.objectives and not all(whole)):
             return None
@@ -200,7 +200,7 @@ def _bounded(margin: float) -> float:
 
 
 def _cost(margin: float) -> float:
-    """Return the cost of a statement: 1 to 2 by its distance if it fails, and a little if its margin is thin."""
+    """Return the cost of a statement: 1 to 2 if it fails, and a little for a thin margin."""
     if margin < 0.0:
         return 1.0 + distance(margin)
     return 0.3 * max(0.0, 1.0 - margin / _ROOM)

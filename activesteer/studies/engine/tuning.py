@@ -1,4 +1,4 @@
-"""Searches over the factors of a study by Optuna: resumable, and with several workers.
+"""Searches over the factors of a study with Optuna, resumable and on several workers.
 
 `tune_table` describes the goals. A requirement to violate is searched for each controller in each manoeuvre. A
 violation is a proof; the absence of one is none.
@@ -41,7 +41,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of values that was tried."""
+    """A set of values, with its judgement."""
 
     number: int
     values: dict[str, Any]  # factor -> value
@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of a search: the sets that were tried, and the best ones."""
+    """Result of a search: all sets, and the best ones."""
 
     goal: Goal
     done: int  # number of all sets that were tried
@@ -95,7 +95,7 @@ class Tuning:
 
     @property
     def fall(self) -> list[tuple[int, float]]:
-        """Number of runs and least margin so far, at every improvement of a search for a violation."""
+        """Number of runs and least margin at every improvement of a search for a violation."""
         found: list[tuple[int, float]] = []
         for trial in self.trials if self.goal is Goal.VIOLATE else ():
             if not found or trial.margins[ANY] < found[-1][1]:
@@ -104,7 +104,7 @@ class Tuning:
 
     @property
     def never_together(self) -> list[tuple[str, str]]:
-        """Pairs of statements that each hold in some set, and in none of the sets together."""
+        """Pairs of statements that hold separately, but never in the same set."""
         held = [set(trial.holding) for trial in self.trials] if self.goal is Goal.SATISFY else []
         ever = dict.fromkeys(
             name for trial in self.trials for name in trial.margins if any(name in own for own in held)
@@ -112,7 +112,7 @@ class Tuning:
         return [pair for pair in itertools.combinations(ever, 2) if not any(own.issuperset(pair) for own in held)]
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, without the trials."""
+        """Return JSON values, without the sets."""
         names = {
             Goal.MINIMISE: ("without_effect",),
             Goal.SATISFY: ("never_together", "plausibility"),
@@ -155,7 +155,7 @@ def tune(
 
 
 def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
-    """Return the progress of the search in a folder, even if another version of the package made it."""
+    """Return the progress of the search in a folder, also of another version of the package."""
     (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
     return search.result(search.stored())
 
@@ -207,7 +207,7 @@ class _Search:
     def __init__(
         self, study: StudyFile, table: TuneTable, folder: Path, examined: str = "", maneuver: str = ""
     ) -> None:
-        """Check the study, with `examined` and `maneuver` for a search for a violation."""
+        """Check the study and prepare the search."""
         self.plan, self.table, self.folder, self.goal = Plan(study), table, folder, table.goal
         self.examined, self.maneuver = examined, maneuver
         self.judge = Judge(self.plan, table, examined)
@@ -217,7 +217,7 @@ class _Search:
         self._seen: Sequence[Row] = ()
 
     def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress | None) -> Tuning:
-        """Try sets until there are enough, and store the result."""
+        """Try the remaining sets, and store the result."""
         total = self.table.trials if trials is None else trials
         total = max(1, runs // len(self._places)) if runs is not None else total
         if self.table.sampler == "grid":
@@ -286,11 +286,11 @@ class _Search:
             yield trial, drive, self.plan.settings, self._requests(trial.number, values)
 
     def _requests(self, number: int, values: dict[str, Any]) -> list[Request]:
-        """Return the runs of a set of values, in all manoeuvres and vehicles with all controllers."""
+        """Return the runs of a set, in all manoeuvres and vehicles with all controllers."""
         return [self.plan.request_with(run, number, place, values) for run, place in enumerate(self._places)]
 
     def _seeds(self) -> list[dict[str, Any]]:
-        """Return the sets to try first: those of the file, a whole grid, or the nominal values for statements."""
+        """Return the first sets to try: seeds, a whole grid, or the nominal values for statements."""
         factors, prior, seeds = self.plan.study.factors, self.judge.prior, self.table.seeds
         # Optuna's own samplers of grids end the search when they are through, which fails outside of its loop.
         if self.table.sampler == "grid":
@@ -305,7 +305,7 @@ class _Search:
         return [nominal, *({**nominal, **seed} for seed in seeds)]
 
     def _sampler(self, made: Any, total: int) -> Any:
-        """Return the sampler of Optuna, with another seed when a search is resumed."""
+        """Return the sampler of Optuna, with a new seed after a resumption."""
         optuna, seed = _optuna(), self.plan.study.seed + len(made.trials)
         best: list[Any] = []
         name = self.table.sampler
@@ -332,7 +332,7 @@ class _Search:
             }[name]()
 
     def _tell(self, made: Any, trial: Any, rows: Sequence[Row]) -> None:
-        """Judge a set by the rows of its runs."""
+        """Judge a set from the rows of its runs."""
         found = self.judge.judged(rows, trial.params)
         if found is None:
             made.tell(trial, state=_optuna().trial.TrialState.FAIL)
@@ -346,7 +346,7 @@ class _Search:
         made.tell(trial, found.objectives)
 
     def result(self, made: Any) -> Tuning:
-        """Return the result of the sets that were tried."""
+        """Return the result of all sets."""
         states = _optuna().trial.TrialState
         done = [trial for trial in made.get_trials(deepcopy=False) if trial.state.is_finished()]
         trials = [self._trial(trial) for trial in done if trial.state == states.COMPLETE]
@@ -381,7 +381,7 @@ class _Search:
 
 
 def _plausible(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the most plausible set for each number of statements that hold, from the most down."""
+    """Return the most plausible set for each number of statements that hold, in descending order."""
     front: list[Trial] = []
     for one in sorted(trials, key=lambda trial: (-len(trial.holding), trial.implausibility)):
         last = front[-1] if front else None

@@ -1,4 +1,4 @@
-"""Workers that do tasks, with one interface: this process, processes of this machine, or a Dask cluster.
+"""Workers for tasks, with one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
 and repeated. A task that kills its worker every time is given up.
@@ -28,7 +28,7 @@ _MOST_JOBS: Final = 16
 
 
 class Workers:
-    """This process, which does every task immediately.
+    """Worker in this process, which executes every task at once.
 
     Others override its methods.
 
@@ -48,7 +48,7 @@ class Workers:
         return future
 
     def died(self, error: BaseException) -> bool:
-        """Return True if an error means that a worker died, not that the task failed."""
+        """Return whether an error means that a worker died."""
         return False
 
     def replace(self) -> None:
@@ -63,10 +63,10 @@ class Workers:
 
 
 class LocalProcesses(Workers):
-    """Newly started processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
+    """Pool of new processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
 
     def __init__(self, count: int) -> None:
-        """Prepare the pool, which starts processes as tasks arrive."""
+        """Prepare the pool. Its processes start as tasks arrive."""
         self._count = count
         self.in_flight = count + 1  # one task waits, so that no process does
         self._pool = self._new_pool()
@@ -94,7 +94,7 @@ class LocalProcesses(Workers):
         return isinstance(error, BrokenExecutor)
 
     def replace(self) -> None:
-        """Replace the pool, which ends with the first of its processes that dies."""
+        """Replace the broken pool."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = self._new_pool()
 
@@ -108,7 +108,7 @@ class LocalProcesses(Workers):
 
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Let processes started inside solve linear equations in one thread, unless the environment sets the number.
+    """Context whose new processes solve linear equations in one thread, unless the environment sets a number.
 
     There is already a process for each processor, and the equations of a run are small: threads of BLAS would wait
     longer than they calculate, which makes a run a tenth slower.
@@ -123,7 +123,7 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _begin_worker() -> None:
-    """End this worker when the process that gives it work ends."""
+    """End this worker when its parent process ends."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
@@ -149,7 +149,7 @@ class DaskCluster(Workers):
     """
 
     def __init__(self, client: Any) -> None:
-        """Check the cluster, whose client still belongs to the caller."""
+        """Check the cluster. Its client still belongs to the caller."""
         self._client = client
         self._executor = client.get_executor(pure=False)
         try:
@@ -169,11 +169,11 @@ class DaskCluster(Workers):
         return self._executor.submit(function, *arguments)
 
     def died(self, error: BaseException) -> bool:
-        """Return True for the error of a task that killed several workers or that the scheduler lost."""
+        """Return True for a task that killed several workers or that the scheduler lost."""
         return type(error).__name__ == "KilledWorker" or isinstance(error, CancelledError)
 
     def replace(self) -> None:
-        """Check that the scheduler still exists, while the cluster replaces its workers itself."""
+        """Check that the scheduler still exists. The cluster replaces its workers itself."""
         try:
             self._client.wait_for_workers(1, timeout=_WORKERS_S)
         except Exception as reason:
@@ -183,7 +183,7 @@ class DaskCluster(Workers):
         self._count()
 
     def everywhere(self, check: Callable[..., str], *arguments: Any) -> str:
-        """Start a task like `Workers`, first on one worker of each machine, so that kernels are compiled once."""
+        """Start one task per machine first, so that each machine compiles its kernels once."""
         hosts: dict[str, list[str]] = {}
         for address in self._client.nthreads():
             hosts.setdefault(address.rpartition(":")[0], []).append(address)
@@ -198,14 +198,14 @@ class DaskCluster(Workers):
         return ""
 
     def close(self, *, abandon: bool) -> None:
-        """Cancel the tasks that have not begun."""
+        """Cancel the tasks that have not started."""
         with contextlib.suppress(Exception):  # without a cluster there is nothing to cancel
             self._executor.shutdown(wait=not abandon, cancel_futures=True)
 
 
 @contextlib.contextmanager
 def connected(scheduler: str) -> Iterator[Any]:
-    """Yield a client of the scheduler, given by its address such as tcp://host:8786 or by its file."""
+    """Yield a client of the scheduler at an address such as tcp://host:8786, or in a scheduler file."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra
     except ImportError as reason:
@@ -249,7 +249,7 @@ def _line(reason: BaseException) -> str:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """Yield this machine's processes, by default one per processor, or a Dask cluster.
+    """Yield the processes of this machine, or a Dask cluster.
 
     Abandon tasks if the body fails.
 
@@ -289,18 +289,18 @@ _engine: Final = threading.RLock()
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
-    """The worker of a task died at every attempt."""
+    """Death of the worker of a task at every attempt."""
 
 
 class Outcome(NamedTuple):
-    """Outcome of a task by its key: the result of its function, or the error that it raised instead."""
+    """Outcome of a task by its key: its result or its error."""
 
     key: Any
     value: Any
     error: BaseException | None
 
     def result(self) -> Any:
-        """Return the result, or raise the error of the task."""
+        """Return the result, or raise the error."""
         if self.error is not None:
             raise self.error
         return self.value
@@ -327,11 +327,11 @@ class TaskQueue:
         self._waiting.append(_Task(key, function, arguments))
 
     def add_alone(self, key: Any, function: Callable[..., Any], *arguments: Any) -> None:
-        """Append a task that may kill its worker: it is tried once, without other tasks at the same time."""
+        """Append a risky task, which runs alone and only once."""
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:
-        """Do the tasks and yield their outcomes, in the order of completion.
+        """Execute the tasks and yield their outcomes, in the order of completion.
 
         The caller may add tasks while iterating.
         """
@@ -391,7 +391,7 @@ def in_parallel(
     scheduler: str | None = None,
     workers: Workers | None = None,
 ) -> list[Any]:
-    """Call a function of a module with each set of arguments, and return the results in the same order.
+    """Call a function with each set of arguments, and return the results in the same order.
 
     `report` gets the index of the arguments and the number of finished calls. Given workers still belong to the caller;
     otherwise see `workers_for`.

@@ -1,4 +1,4 @@
-"""The loop of driver and car, linear and after a small step.
+"""The loop of driver and car: linear analysis, and run with a small step of the path.
 
 The loop consists of the linearised car (`linearisation`), the controller's linear form with its corrector fully active
 (`controllers.linear_form`), and the driver: his control law about a straight path, decided every 10 ms, a reaction
@@ -114,7 +114,7 @@ _NOTICED: Final = 0.05
 
 @dataclass(frozen=True)
 class DriverLoop:
-    """The loop over one period of the driver, from one decision to the next.
+    """Loop of driver and car over one period of the driver.
 
     Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the car's steering wheel angles in the steps of the
     period; the angles from the driver are C x[k]. His knowledge of his own decisions stays in A.
@@ -129,7 +129,7 @@ class DriverLoop:
 
     @cached_property
     def response(self) -> NDArray[np.complexfloating]:
-        """Return the complex return ratio at `FREQUENCIES_RADPS`, with -1 as the limit of stability."""
+        """Return the complex return ratio at `FREQUENCIES_RADPS`, where -1 is the limit of stability."""
         from scipy.linalg import schur, solve_triangular  # noqa: PLC0415 - slow to import
 
         steps = len(self.c)
@@ -146,7 +146,7 @@ class DriverLoop:
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Return crossover frequency [rad/s] and phase margin [rad], the smallest margin of several crossovers.
+        """Return crossover frequency [rad/s] and phase margin [rad], the smallest margin of several.
 
         Both are nan if the gain never crosses 1.
         """
@@ -192,7 +192,7 @@ class DriverLoop:
 def driver_loop(
     car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
 ) -> DriverLoop:
-    """Assemble the loop of a car, a controller with the car's step, and a driver with his gains, all at one speed."""
+    """Assemble the loop of car, controller and driver at one speed."""
     steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
     waiting = round(driver.reaction_delay_s / PREVIEW_INTERVAL_S)
     n, states = len(car.a), len(controller.a)
@@ -245,7 +245,7 @@ def driver_loop(
 
 @dataclass(frozen=True)
 class LoopAtSpeed:
-    """A loop at one speed with one controller, and the same in a run of the full car."""
+    """Loop with one controller at one speed, and the corresponding run of the full car."""
 
     speed_kmh: float
     controller: str
@@ -254,12 +254,12 @@ class LoopAtSpeed:
 
     @property
     def damping_in_run(self) -> float:
-        """Damping ratio after the small step in the run."""
+        """Damping ratio in the run after the small step."""
         return damping_of(self.run.time_s, self.run["y_m"])[0]
 
     @property
     def step_difference_m(self) -> float:
-        """Largest distance between the linear car and the car of the run after the small step [m]."""
+        """Largest distance between the linear car and the full car after the small step [m]."""
         time_s, y_m = self.loop.step()
         return float(np.abs(np.interp(time_s, self.run.time_s, self.run["y_m"]) - y_m).max())
 
@@ -288,7 +288,7 @@ def driver_loops(
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
 ) -> list[LoopAtSpeed]:
-    """Return the loop with every controller at every speed."""
+    """Return the loops of every controller at every speed."""
     scenario = resolve("straight_line", vehicle, overrides, driver, controllers)
     check_gains(overrides or {}, controllers)
     if not scenario.driver.plugin.is_builtin:
@@ -309,7 +309,7 @@ def driver_loops(
 
 
 def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
-    """Return a text on the smallest phase margin and the smallest damping, compared with the requirements."""
+    """Describe the smallest phase margin and the smallest damping, compared with the requirements."""
     found: list[Text] = []
     slowest, fastest = DAMPED_KMH
     damped = f" from {slowest:g} to {fastest:g} km/h"
@@ -350,7 +350,7 @@ _FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
 
 
 def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture) -> Page:
-    """Return the page of a loop, without columns where nothing oscillates."""
+    """Return the page of the loops."""
     heads = {key: head for key, head in _HEADS.items() if key not in _FROM_RUNS or any(row[key] < 1.0 for row in rows)}
     cells = [
         [
@@ -371,7 +371,7 @@ def driver_page(title: str, rows: Sequence[Mapping[str, Any]], picture: Picture)
 
 
 def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[str, Any]]) -> Picture:
-    """Return Bode diagrams and a step of the path at the middle speed, and the damping versus speed."""
+    """Return the figures: Bode diagrams and a step of the path at the middle speed, and damping versus speed."""
     speeds = sorted({row["speed_kmh"] for row in rows})
     middle = speeds[len(speeds) // 2]
     controllers = list(dict.fromkeys(row["controller"] for row in rows))

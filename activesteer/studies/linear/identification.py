@@ -56,18 +56,18 @@ class Identification:
     two_track: TwoTrackParameters
 
     def table(self) -> str:
-        """Return the result as text: a column per test, then the keys of [single_track] and [two_track]."""
+        """Return the result as lines: a column per test, then the keys of [single_track] and [two_track]."""
         shown = comparison(self.tests)
         for name, lines in self.lines().items():
             shown += "\n".join([f"\n\n[{name}]", *(f"{key} = {value}" for key, value in lines.items())])
         return shown
 
     def lines(self) -> dict[str, dict[str, str]]:
-        """Return the tables of the vehicle file, each with its values as text by key."""
+        """Return the tables of the vehicle file, with formatted values by key."""
         return {"single_track": single_track_lines(self.single_track), "two_track": two_track_lines(self.two_track)}
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values in SI: `metrics` with name, test, value and unit, and both models."""
+        """Return the metrics and both models as JSON values in SI units."""
         metrics = [
             {"name": name.rpartition("_")[0], "test": test, "value": value * unit.factor, "unit": unit.name}
             for test, handling in self.tests.items()
@@ -119,7 +119,7 @@ def identify(
 
 
 def single_track_lines(parameters: SingleTrackParameters) -> dict[str, str]:
-    """Return keys and values of the table [single_track], rounded to the resolution of the tests."""
+    """Return the entries of the table [single_track], rounded to the resolution of the tests."""
     p = parameters
     lines = {
         "mass_kg": f"{p.mass_kg:.1f}",

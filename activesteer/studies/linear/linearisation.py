@@ -1,4 +1,4 @@
-"""The linearised car, and its map from step to step.
+"""The linearised car: its discrete-time map and its modes.
 
 Method:
 
@@ -78,7 +78,7 @@ class DiscreteTimeMap:
         self._columns = [names.index(name) for name in (*OUTPUTS, *ACTUATORS)]
 
     def __call__(self, x: Array, u: Array, more_torque_Nm: float = 0.0) -> Array:
-        """Return the state after the step, as a difference from the reference."""
+        """Return the difference from the reference state after the step."""
         self.local.write(x)
         steering_wheel, rear, added = (float(value) for value in u)
         command = DriverCommand(steering_wheel, self.torque_Nm + more_torque_Nm)
@@ -86,7 +86,7 @@ class DiscreteTimeMap:
         return self.local.read()
 
     def trim(self, speed_mps: float) -> None:
-        """Make steady straight driving the reference, with its drive torque."""
+        """Set steady straight driving, with its drive torque, as the reference."""
         size, rest = len(self.local.names), np.zeros(len(INPUTS))
         speed = self.local.names.index("d_x")
         x = np.zeros(size)
@@ -176,7 +176,7 @@ class LinearCar:
     actuators: Array
 
     def modes(self) -> list[Mode]:
-        """Return all modes by natural frequency, of a conjugate pair the one with positive imaginary part."""
+        """Return all modes by natural frequency, with one mode for each conjugate pair."""
         return find_modes(self.a, self.states, self.timestep_s)
 
     def state_space(self, cut_off_Hz: float = CUT_OFF_HZ) -> control.StateSpace:
@@ -239,7 +239,7 @@ class LinearCar:
 
 
 def _identifier(name: str, taken: Sequence[str]) -> str:
-    """Return an identifier from the name of a mode, with a number if the identifier is taken."""
+    """Return a unique identifier from the name of a mode."""
     base = re.sub(r"\W+", "_", name)
     used = {re.sub(r"_(re|im)$", "", other) for other in taken}
     return next(name for name in (base, *(f"{base}_{number}" for number in range(2, 99))) if name not in used)
@@ -290,7 +290,7 @@ def linear_car(
     overrides: Mapping[str, Any] | None = None,
     controllers: Sequence[Any] = (),
 ) -> LinearCar:
-    """Return the car before reduction, with all modes, for overrides that may include controllers."""
+    """Return the car with all modes, before reduction."""
     speed_mps = float(speed_mps)
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
@@ -334,7 +334,7 @@ def linear_response(recording: RecordingLike, system: control.StateSpace) -> dic
 def outputs_of(
     system: control.StateSpace, names: Sequence[str], time_s: ArrayLike, inputs: Sequence[ArrayLike]
 ) -> dict[str, Array]:
-    """Return the outputs of a linear system over time, by these names."""
+    """Return the named outputs of a linear system over time."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
     given: Any = np.array(inputs, dtype=np.float64)
@@ -343,7 +343,7 @@ def outputs_of(
 
 
 def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> str:
-    """Return modes as text: name, natural frequency, damping ratio, eigenvalue, and the participating parts.
+    """Return a table of modes as lines: name, frequency, damping ratio, eigenvalue and participating parts.
 
     Args:
         modes: Modes, as from `LinearCar.modes`.
@@ -374,7 +374,7 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
 
 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
-    """Return the page of a linear car: its modes, its response to the steering wheel, and its poles versus speed."""
+    """Return the page of a linear car: modes, response to the steering wheel, and poles versus speed."""
     rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
     table = Table("", _MODE_COLUMNS, rows)
     sections = [
@@ -390,7 +390,7 @@ def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture)
 
 
 def _conclusion(modes: Sequence[Mode]) -> list[Text]:
-    """Return a text on the stability and the least damped mode of the car, and of yaw and sideslip."""
+    """Describe the stability and the least damped mode of the car, and of yaw and sideslip."""
     shown = [mode for mode in modes if mode.natural_frequency_Hz <= CUT_OFF_HZ]
     growing = ", ".join(dict.fromkeys(mode.name for mode in shown if mode.eigenvalue_1ps.real > 0.0))
     swinging = sorted((mode for mode in shown if mode.eigenvalue_1ps.imag), key=lambda mode: mode.damping_ratio)
@@ -424,7 +424,7 @@ _GAIN_UNITS: Final = {
 
 
 def bode_picture(label: str, system: control.StateSpace) -> Picture:
-    """Return gain and phase of a linear car over frequency, from the steering wheel to its outputs."""
+    """Return the Bode diagrams of a linear car, from the steering wheel to its outputs."""
     frequency_Hz = np.geomspace(*BODE_RANGE_Hz, 300)
     found = system(2j * math.pi * frequency_Hz, squeeze=False)
     panels = []
@@ -440,7 +440,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
 
 
 def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequence[float]) -> Picture:
-    """Return the named poles of a car versus its speed, from systems in modal form, with rays of equal damping."""
+    """Return the plot of the named poles versus speed, with rays of equal damping."""
     limit, angle = 2.0 * math.pi * LOCUS_LIMIT_Hz, np.linspace(math.pi / 2.0, math.pi, 60)
     curves, notes = [], []
     for frequency_Hz in range(1, math.ceil(LOCUS_LIMIT_Hz)):
@@ -474,7 +474,7 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
 
 
 def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
-    """Yield the name of each mode and its pole, of a conjugate pair the upper one."""
+    """Yield the name and the pole of each mode, with the upper pole of a conjugate pair."""
     a = np.asarray(system.A)
     for row, name in enumerate(system.state_labels):
         if not name.endswith("_im"):
@@ -484,7 +484,7 @@ def _named_poles(system: control.StateSpace) -> Iterator[tuple[str, complex]]:
 
 
 def _branches(found: Sequence[Sequence[tuple[str, complex]]]) -> list[tuple[str, list[complex]]]:
-    """Return the paths of poles between speeds, each with its most common name that no longer path has."""
+    """Connect the poles of all speeds to paths, each named by its most common free name."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - slow to import
 
     paths: list[list[tuple[str, complex]]] = []

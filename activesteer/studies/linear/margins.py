@@ -1,4 +1,4 @@
-"""Stability margins of the loop of controller, actuators, car and sensors, for one car or a study.
+"""Stability margins of the loop of controller, actuators, car and sensors, for one or many cars.
 
 The loop runs from the demand of an actuator through the linearised car (`linearisation`: servo, suspensions, tyres),
 the sensors (bandwidth, delay), the control unit (its interval, the bus) and the controller back to the demand. It is
@@ -80,7 +80,7 @@ Response = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop, or nan if a margin does not exist, such as the gain margin of a loop above -180 deg."""
+    """Margins of one loop, nan for a margin that does not exist."""
 
     gain_dB: float  # smallest factor on the gain, up or down, that makes the loop marginal [dB]
     phase_rad: float  # smallest phase that makes it marginal [rad]
@@ -108,7 +108,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """Return the smallest of each margin, or none if a loop is unstable."""
+    """Return the smallest of each margin, none if a loop is unstable."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -121,7 +121,7 @@ def _least(values: Array) -> float:
 def round_trip(
     car: LinearCar, answer: Callable[[Array], Response], scenario: Scenario, unit_s: float, frequencies_radps: Array
 ) -> Response:
-    """Return the return ratio M of the demands, with the closed loop u = M u."""
+    """Return the return ratio M of the demands, where u = M u closes the loop."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
     states = np.linalg.solve(
@@ -146,7 +146,7 @@ def _held(steps: int, back: Response) -> Response:
 
 
 def _calls(sensor: Sensor, unit_s: float) -> int:
-    """Return the number of calls of the control unit that hold one sample."""
+    """Return the number of controller calls that use the same sample."""
     return max(1, round((sensor.sample_time_s or 0.0) / unit_s))
 
 
@@ -158,7 +158,7 @@ def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Respon
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """Return the loop gain L opened at one demand with the other closed, where 1 + L = 0 is the limit of stability."""
+    """Return the loop gain opened at one demand while the other one is closed. Stability is lost at 1 + L = 0."""
     own = LOOPS.index(loop)
     other = 1 - own
     through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])
@@ -166,7 +166,7 @@ def opened(returned: Response, loop: str) -> Response:
 
 
 def opened_at_both(returned: Response) -> tuple[Response, Response]:
-    """Return the loops L of a common factor f on both demands, with 1 + f L = 0 where det(1 - f M) = 0."""
+    """Return the loop gains of a common factor on both demands. Stability is lost at 1 + f L = 0."""
     values: Response = np.asarray(np.linalg.eigvals(returned), dtype=np.complex128)
     for before, here in itertools.pairwise(values):
         if np.abs(here - before).sum() > np.abs(here[::-1] - before).sum():
@@ -175,7 +175,7 @@ def opened_at_both(returned: Response) -> tuple[Response, Response]:
 
 
 def is_stable(returned: Response) -> bool:
-    """Return True if the closed loops are stable, given stable parts: det(1 - M) never encircles 0 (Nyquist)."""
+    """Return whether the closed loops are stable, for stable blocks (Nyquist: no encirclement of 0 by det(1 - M))."""
     determinant = np.linalg.det(np.eye(2) - returned)
     turned = np.unwrap(np.angle(determinant))
     # From the lowest frequency to the highest, an unstable real pole turns it by half a revolution, a pair by a whole
@@ -185,7 +185,7 @@ def is_stable(returned: Response) -> bool:
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of one loop of a controller at a speed."""
+    """Margins of one loop of a controller at one speed."""
 
     controller: str
     loop: str  # point at which the loop is opened: one of `LOOPS`, or `BOTH`
@@ -234,7 +234,7 @@ def _margins(
     *,
     keep_curves: bool = False,
 ) -> list[list[LoopMargins]]:
-    """Return the margins of several cars, given by their overrides.
+    """Return the margins of several cars, given by overrides.
 
     A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
     """
@@ -279,7 +279,7 @@ def _of_loops(controller: str, speed_kmh: float, returned: Response) -> list[Loo
 
 
 def _rolling(scenario: Scenario) -> Measurement:
-    """Return the measurement of ideal sensors for straight rolling, with all lateral values zero."""
+    """Return the measurement of ideal sensors for straight rolling."""
     config = scenario.car.config
     ideal = replace(config, sensors=type(config.sensors)())
     rolling = ClosedLoop(replace(scenario, car=replace(scenario.car, config=ideal))).measurement
@@ -290,7 +290,7 @@ def _rolling(scenario: Scenario) -> Measurement:
 
 
 def _fully_active(setup: ControllerSetup) -> ControllerSetup:
-    """Return the setup with correctors without a dead band, so that they act on all errors."""
+    """Return the setup with correctors without a dead band."""
     gains = setup.gains
     acting = {
         name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))
@@ -302,7 +302,7 @@ def _fully_active(setup: ControllerSetup) -> ControllerSetup:
 def _answer(
     given: Any, name: str, scenario: Scenario, setup: ControllerSetup, made: Controller
 ) -> Callable[[Array], Response]:
-    """Return the controller's frequency response, demands per measurement."""
+    """Return the frequency response of a controller, demands per measurement."""
     rolling = _rolling(scenario)
     if not has_linear_form(given):
         return _answer_to_samples(scenario.car.config.sensors.all(), made, rolling, setup.timestep_s, name)
@@ -363,7 +363,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
 
 
 def disk(alpha: float) -> tuple[float, float]:
-    """Return centre and radius of the disk that a loop gain with a disk margin does not enter.
+    """Return centre and radius of the disk that the loop gain avoids, for a disk margin.
 
     It holds all L with |1 + L| < alpha / 2 |1 - L|, on whose edge a factor of the size alpha makes the loop marginal.
 
@@ -389,7 +389,7 @@ def _picture(found: Sequence[LoopMargins]) -> Picture:
 
 
 def _panel(name: str, loops: Sequence[LoopMargins], low: float, high: float) -> Panel:
-    """Return the curves of a loop at all speeds, with the disk of the smallest disk margin."""
+    """Return the plot of a loop's Nyquist curves at all speeds, with the smallest disk margin."""
     curves = [
         Curve(part.real, part.imag, shade=(each.speed_kmh - low) / (high - low) if high > low else 0.5)
         for each in loops
@@ -435,7 +435,7 @@ def worst_margins(
     jobs: int | None = None,
     scheduler: str | None = None,
 ) -> list[LoopMargins]:
-    """Return the smallest margins of every loop at every speed over the samples of a study.
+    """Return the smallest margins of every loop at every speed over the cars of a study.
 
     Factors for single manoeuvres are left out; manoeuvres, cars and controllers of the study have no effect. Overrides
     may not set a key that the study varies. With more than one process, controllers must be picklable. `factors` are

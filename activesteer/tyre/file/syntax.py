@@ -32,7 +32,7 @@ _SECTION = re.compile(r"\[\s*([^\[\]]{1,80}?)\s*\]")
 
 @dataclass(frozen=True)
 class Entry:
-    """One `KEY = value` of a file: section and key in upper case, a number or the text between quotes, line from 1."""
+    """Entry `KEY = value` of a file, with section, value and line number."""
 
     section: str
     key: str
@@ -40,7 +40,7 @@ class Entry:
     line: int
 
     def fail(self, problem: str, source: Path) -> TyreFileError:
-        """Return an error about this entry of a file."""
+        """Return an error about this entry."""
         return TyreFileError(problem, file=str(source), line=self.line, key=self.key, value=self.value)
 
 
@@ -51,7 +51,7 @@ def read_text(path: Path) -> str:
 
 
 def number(text: str) -> float | None:
-    """Return the finite number in a text (Fortran's D exponent included), None if it is not a number."""
+    """Parse a finite number, including Fortran's D exponent, or return None."""
     if not _NUMBER.match(text):
         return None
     value = float(text.replace("d", "e").replace("D", "e"))
@@ -72,7 +72,7 @@ def _without_comment(line: str) -> str:
 
 
 def _value(text: str) -> float | str:
-    """Return the number in a text, or the text without its quotes."""
+    """Parse a number, or return the string without its quotes."""
     found = number(text)
     if found is not None:
         return found
@@ -82,7 +82,7 @@ def _value(text: str) -> float | str:
 
 
 def parse(text: str, source: str) -> tuple[tuple[Entry, ...], dict[str, tuple[tuple[float, ...], ...]]]:
-    """Split a .tir file into its entries, and its rows of numbers by section (`[SHAPE]`, deflection curves)."""
+    """Split a .tir file into its entries and its rows of numbers by section."""
     section = ""
     entries: list[Entry] = []
     tables: dict[str, list[tuple[float, ...]]] = {}
@@ -146,7 +146,7 @@ def si_factor(quantity: str, units: Mapping[str, float]) -> float:
 
 
 class Coefficient(NamedTuple):
-    """One key of a .tir file, with a default of None if another quantity replaces it."""
+    """One key of a .tir file. Its default is None if another quantity replaces it."""
 
     name: str
     section: str
@@ -157,7 +157,7 @@ class Coefficient(NamedTuple):
 
 
 def _parse(table: str) -> tuple[Coefficient, ...]:
-    """Turn the table into records, in its order."""
+    """Convert the table into records, in its order."""
     section, rows = "", []
     for line in table.splitlines():
         if line.startswith("["):

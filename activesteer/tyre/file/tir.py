@@ -66,7 +66,7 @@ def load_tir(path: str | Path, mounted: Side | None = None, *, slip_tangent: boo
 def tir_from_text(
     text: str, source: Path, mounted: Side | None = None, *, slip_tangent: bool = False
 ) -> TyreParameters:
-    """Read a tyre property file from memory as `load_tir` does, with the source as its name in messages."""
+    """Read a tyre property file from memory (see `load_tir`)."""
     entries, tables = parse(text, str(source))
     units = _units(entries, source)
     lines: dict[str, Entry] = {}
@@ -101,7 +101,7 @@ def tir_from_text(
 
 
 def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> None:
-    """Keep one entry per coefficient, preferably from its own section, or raise for two different values."""
+    """Keep one entry per coefficient, and reject contradictory entries."""
     before = lines.get(name)
     if before is None or before.value == entry.value:
         lines[name] = entry
@@ -115,7 +115,7 @@ def _place(lines: dict[str, Entry], name: str, entry: Entry, source: Path) -> No
 
 
 def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
-    """Return the sizes in SI of the file's units."""
+    """Return the SI values of the units in the file."""
     sizes: dict[str, float] = {}
     for entry in entries:
         if entry.section != "UNITS" or entry.key not in BASE_UNITS:
@@ -129,7 +129,7 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
 
 
 def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
-    """Return the version of a PAC2002 file, which has no FITTYP, or reject a file of another tyre model."""
+    """Return the version of a PAC2002 file, or reject a file of another tyre model."""
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(
@@ -143,7 +143,7 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
 
 
 def _side(words: Mapping[str, str], source: Path) -> Side:
-    """Return the side of the vehicle that the file is for, left for a symmetric tyre."""
+    """Return the vehicle side of the file, left for a symmetric tyre."""
     side = words.get("TYRESIDE", "LEFT").upper()
     if side == "RIGHT":
         return "RIGHT"
@@ -194,5 +194,5 @@ def tir_text(parameters: TyreParameters, comment: str = "") -> str:
 
 
 def write_tir(parameters: TyreParameters, path: str | Path, comment: str = "") -> None:
-    """Write a tyre to a .tir file, Latin-1 (see `tir_text`)."""
+    """Write a tyre to a .tir file in Latin-1 (see `tir_text`)."""
     Path(path).write_text(tir_text(parameters, comment), encoding="latin-1")

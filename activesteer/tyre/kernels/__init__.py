@@ -1,4 +1,4 @@
-"""Formulas of the tyre, compiled, on plain floats.
+"""Compiled formulas of the tyre on plain floats.
 
 Arguments of the kernels with the symbols of their source (Pacejka, Tire and Vehicle Dynamics, 2012, section 4.3.2;
 SI and radians, ISO-W axes at the contact point):

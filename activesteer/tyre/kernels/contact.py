@@ -58,7 +58,7 @@ _LOAD_TOLERANCE: Final = 1e-9
 
 
 class WheelForces(NamedTuple):
-    """Forces of one tyre and intermediate quantities, ISO-W frame at the contact point."""
+    """Forces and intermediate quantities of one tyre, in the ISO-W frame at the contact point."""
 
     fx_N: float
     fy_N: float
@@ -101,13 +101,13 @@ class _Rolling(NamedTuple):
 
 @compiled
 def _mean_decay(x):
-    """Return the mean of exp(-t) over t from 0 to x: the average remaining fraction of a rate over a step."""
+    """Return the mean of exp(-t) over t from 0 to x, the average remaining fraction of a rate over a step."""
     return -math.expm1(-x) / x if x > 1e-9 else 1.0
 
 
 @compiled
 def _low_speed_slip_limit(file_limit, sliding_slip, fraction):
-    """Return the slip that limits the deflection: the sliding slip at rest, the file's limit in motion."""
+    """Return the slip at which the deflection is limited: the sliding slip at rest, the file's limit in motion."""
     return file_limit + (min(sliding_slip, file_limit) - file_limit) * fraction
 
 
@@ -196,7 +196,7 @@ def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
 
 @compiled
 def _load(p, deflection, spin, pressure_Pa, damping_N, fx, fy, gamma):
-    """Return the load [N] under horizontal forces, which the damper changes by at most the force of the spring."""
+    """Return the load under horizontal forces [N]. The damper changes it by at most the spring force."""
     elastic = vertical_force_loaded(p, deflection, spin, pressure_Pa, fx, fy, gamma)
     elastic += bottoming_force(p, deflection, spin)
     # The load is continuous when the tyre touches down or lifts off, and the road never pulls.

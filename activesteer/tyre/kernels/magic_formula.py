@@ -1,4 +1,4 @@
-"""The Magic Formula: forces and moments of a tyre in steady state, one compiled kernel.
+"""The Magic Formula: steady-state forces and moments of a tyre in one compiled kernel.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, equations 4.E31 to 4.E49 and 4.E68 to 4.E78, with the
 corrections that the property files need: in the overturning moment the square stands on the arc tangent's argument, and
@@ -204,7 +204,7 @@ class SteadyState(NamedTuple):
 
 @compiled
 def rolling_direction(p, vx_mps: float) -> float:
-    """Return 1 rolling forward, -1 backward, and a sine between them below VXLOW."""
+    """Return the rolling direction: 1 forwards, -1 backwards, a sine between them below VXLOW."""
     low = p.VXLOW
     if vx_mps >= low:
         return 1.0
@@ -215,13 +215,13 @@ def rolling_direction(p, vx_mps: float) -> float:
 
 @compiled
 def clamp(x: float, low: float, high: float) -> float:
-    """Return the value, or the limit that it exceeds."""
+    """Clamp a value to its limits."""
     return min(max(x, low), high)
 
 
 @compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
-    """Return the pressure over the nominal one, less 1."""
+    """Return the relative deviation of the pressure from the nominal one."""
     return clamp(pressure_Pa, p.PRESMIN, p.PRESMAX) / p.NOMPRES - 1.0
 
 
@@ -229,7 +229,7 @@ def relative_pressure(p, pressure_Pa: float) -> float:
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
-    """Evaluate the formula once, as a `SteadyState`."""
+    """Evaluate the formula once."""
     if not fz > 0.0:
         return SteadyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     load = clamp(fz, p.FZMIN, p.FZMAX)

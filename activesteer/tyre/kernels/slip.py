@@ -1,4 +1,4 @@
-"""Forces at pure slip and at combined slip, turn slip factors and relaxation lengths, compiled, on plain floats.
+"""Compiled formulas of slip forces, combined slip, turn slip and relaxation lengths.
 
 Symbols are those of the source: p (record of the tyre), z0 ... z4 (turn slip factors zeta), lmu (friction scale with
 the road's), `_s` for the starred angles, K stiffness, S_H and S_V shifts.
@@ -32,7 +32,7 @@ MF52 = 52.0
 
 @compiled
 def guarded(x: float) -> float:
-    """Move a denominator away from zero, in the direction of its sign."""
+    """Shift a denominator away from zero, in the direction of its sign."""
     return x + EPSILON if x >= 0.0 else x - EPSILON
 
 
@@ -160,7 +160,7 @@ def friction_ellipse(
     p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
     k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,
 ):  # fmt: skip
-    """Return the factors of both pure forces at combined slip: an ellipse, divided by the ratio of the shifted slips.
+    """Return the factors of both pure forces at combined slip, by the friction ellipse of PAC2002.
 
     Returns:
         Factors of the longitudinal and of the lateral force, 0 to 1.
@@ -188,7 +188,7 @@ _MAX_TURN_SLIP = 1e6
 
 @compiled
 def rolling_speed(p, fz: float, kappa: float, pressure: float, vx: float):
-    """Return rotational speed [rad/s] and effective radius [m] of a wheel at a given slip, solved together."""
+    """Return rotational speed [rad/s] and effective radius [m] of a wheel at a given slip."""
     radius = p.UNLOADED_RADIUS
     omega = 0.0
     for _ in range(30):
@@ -206,7 +206,7 @@ def turn_slip_factors(
     p, fz: float, dfz: float, dpi: float, kappa: float, tan_alpha: float, gamma: float, gamma_s: float,
     pressure: float, vx: float, lmuy: float, g_y: float, turn_slip: float,
 ):  # fmt: skip
-    """Return the factors zeta 0 to 8."""
+    """Return the turn slip factors zeta 0 to 8."""
     r0 = p.UNLOADED_RADIUS
     fz0 = p.LFZO * p.FNOMIN
     epsilon_g = min(p.PECP1 * (1.0 + p.PECP2 * dfz), 0.99)
@@ -255,7 +255,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 
 @compiled
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of a rolling tyre [m] as the contact uses them.
+    """Return the relaxation lengths of a rolling tyre for the contact [m].
 
     A tyre whose file or vehicle says that slip builds up at once has those of a tread block.
     """

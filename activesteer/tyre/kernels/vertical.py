@@ -1,4 +1,4 @@
-"""Vertical force, deflection and radii of a tyre, compiled, on plain floats.
+"""Compiled formulas of vertical force, deflection and radii of a tyre.
 
 Source: Besselink, Schmeitz, Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation pressure
 changes, Vehicle System Dynamics 48 (2010) S1, equations 1 to 10 (the same in Pacejka 2012, A3.1 to A3.7); camber and

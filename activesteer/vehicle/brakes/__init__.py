@@ -1,4 +1,4 @@
-"""Brakes: hydraulics, anti-lock system and traction control, as native code that the car's step calls.
+"""Native brakes: hydraulics, anti-lock system and traction control.
 
 In: pedal, demanded brake torques, wheel speeds and the brakes' parameters.
 Out: brake torques of the wheels, and the states of anti-lock system and traction control.

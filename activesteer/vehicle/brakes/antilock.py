@@ -1,4 +1,4 @@
-"""Anti-lock control of the four wheels: pressure in cycles around the limit of the road.
+"""Anti-lock control of the four wheels, with pressure cycles around the limit of the road.
 
 A wheel that is braked harder than the road permits loses speed quickly, since its inertia is small compared with the
 car's. Its deceleration shows this before its slip is large, on any road, without knowing the slip at peak friction.
@@ -81,7 +81,7 @@ def _hold(setup, state, wheel):
 
 @compiled
 def _roll_before_hold(setup, state, wheel):
-    """Lower the pressure of a cycling wheel: beyond the peak of its friction it would lock at a held pressure."""
+    """Lower the pressure of a cycling wheel, which would lock at a constant pressure."""
     rolls_Nm = setup.release_fraction * max(state.mean_Nm[wheel], 0.0)
     state.limit_Pa[wheel] = rolls_Nm / setup.torque_per_pressure_NmpPa[wheel]
     state.regained_mps2[wheel] = 0.0
@@ -101,13 +101,13 @@ def _resume(setup, state, wheel, slow):
 
 @inlined
 def _largest_slip(setup, state, wheel, fed_Pa):
-    """Slip that releases a wheel in any case, larger for a front wheel that a controller brakes."""
+    """Slip that always releases a wheel, larger for a front wheel that a controller brakes."""
     return setup.intervention_slip if wheel < 2 and state.demand_Pa[wheel] > fed_Pa else setup.largest_slip
 
 
 @inlined
 def _least_slip(setup, state, wheel, car_mps2):
-    """Least slip for the release of a wheel by its deceleration."""
+    """Minimum slip for a release of a wheel by its deceleration."""
     phase = state.phase[wheel]
     minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
     if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
@@ -117,7 +117,7 @@ def _least_slip(setup, state, wheel, car_mps2):
 
 @inlined
 def _follow_mean(setup, state, wheel, slow):
-    """Follow the friction torque at the limit: its peak before the first release, its mean in cycles."""
+    """Update the friction torque at the limit: its peak before the first release, its mean in cycles."""
     difference_Nm = state.friction_Nm[wheel] - state.mean_Nm[wheel]
     if state.phase[wheel] == OFF and difference_Nm > 0.0:
         state.mean_Nm[wheel] += difference_Nm
@@ -127,14 +127,14 @@ def _follow_mean(setup, state, wheel, slow):
 
 @inlined
 def _hand_over(setup, state, wheel):
-    """Raise the limit of a wheel by one step towards the highest pressure, when the car is faster again."""
+    """Raise the pressure limit of a wheel by one step towards the full pressure."""
     highest = setup.full_pedal_pressure_Pa
     state.limit_Pa[wheel] = min(state.limit_Pa[wheel] + setup.hand_over_Paps * setup.interval_s, highest)
 
 
 @inlined
 def _rolls_slowly(setup, state, wheel, locking, gain):
-    """Advance a wheel in OFF or HOLD at low speed."""
+    """Advance a wheel in phase OFF, or in phase HOLD at low speed."""
     if locking and gain < _REGAINS_mps2:
         state.mean_Nm[wheel] *= _HELD_LESS
         _release(setup, state, wheel)
@@ -147,7 +147,7 @@ def _rolls_slowly(setup, state, wheel, locking, gain):
 
 @inlined
 def _recover(setup, state, wheel, gain, regains, slow, locking):
-    """Advance a wheel that regains speed, and let a slow wheel roll until its tyre has followed."""
+    """Advance a wheel that regains speed. Let a slow wheel roll until its tyre has followed."""
     state.borne_Nm[wheel] = max(state.borne_Nm[wheel], state.friction_Nm[wheel])
     state.regained_mps2[wheel] = max(state.regained_mps2[wheel], gain)
     if slow and state.phase_s[wheel] < _TYRE_LAG_M / state.reference_mps:
@@ -206,7 +206,7 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
 
 @compiled
 def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
-    """Decide once for all wheels: advance `limit_Pa`, `allowed_Pa`, the phases and `side_Pa`.
+    """Make the decisions of one control interval for all wheels.
 
     `steered_Pa` is the side-to-side difference that the controller steers against, in addition to the driver's. A
     controller that demands more than `fed_Pa`, the pressure of the pedal, at a front wheel intervenes there.
@@ -232,7 +232,7 @@ def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
 
 @compiled
 def _hold_sides_together(setup, state, steered_Pa):
-    """Limit the front wheel with more grip: its pressure may exceed the other's by what a driver can steer against."""
+    """Limit the pressure of the front wheel with more grip to what a driver can steer against."""
     if state.phase[0] == OFF and state.phase[1] == OFF:
         state.side_Pa = setup.side_difference_Pa
         return

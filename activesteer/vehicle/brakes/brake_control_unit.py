@@ -1,4 +1,4 @@
-"""One step of the brakes: demand, control unit, speed estimate, traction control and pressures.
+"""One step of the brakes: demand, control unit, speed estimate, traction control, and pressures.
 
 While no brake acts, the wheels that are not driven give the speed. While a brake acts, the fastest wheel is closest to
 the car's speed, and the acceleration is integrated from the last unbraked instant on. The measured acceleration is the
@@ -16,13 +16,13 @@ from activesteer.vehicle.brakes.records import NO_LIMIT_NM
 
 @inlined
 def pedal_pressure(setup, pedal):
-    """Return the pressure that the pedal feeds [Pa]: none within its dead travel, and linear beyond it."""
+    """Return the pressure of the pedal [Pa], linear beyond its dead travel."""
     return max(pedal - setup.dead_travel, 0.0) / (1.0 - setup.dead_travel) * setup.full_pedal_pressure_Pa
 
 
 @compiled
 def ask(setup, state, pedal, asked_Nm):
-    """Write into `demand_Pa` the sum of the driver's and the controller's pressures, from 0 to the highest."""
+    """Sum the pressure demands of driver and controller, limited to the highest pressure."""
     highest, fed = setup.full_pedal_pressure_Pa, pedal_pressure(setup, pedal)
     for wheel in range(4):
         pressure = fed
@@ -103,7 +103,7 @@ def follow_car(setup, state, ax_mps2, braked):
 
 @compiled
 def traction(setup, state, torque_Nm, braked):
-    """Decide once about `drive_limit_Nm`, `traction_Nm` and `traction_Pa`.
+    """Make the decisions of traction control: engine limit, motor torques and brake pressures.
 
     The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
     integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
@@ -135,7 +135,7 @@ def traction(setup, state, torque_Nm, braked):
 
 @compiled
 def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, steered_Pa):
-    """Make one step, and return the drive torque that traction control leaves [Nm].
+    """Make one step, and return the drive torque after traction control [Nm].
 
     Speeds and acceleration are measured, `drive_Nm` and `asked_Nm` are the demands of driver and controller, and
     `steered_Pa` is the side-to-side difference that the controller steers against.

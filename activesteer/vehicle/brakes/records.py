@@ -1,4 +1,4 @@
-"""The table [brakes] of a vehicle file, and constants and state of the native brakes.
+"""The table [brakes] of a vehicle file, and the records of the native brakes.
 
 The records of float64 stay at their addresses.
 """
@@ -43,7 +43,7 @@ class Hydraulics:
 
 @dataclass(frozen=True)
 class Antilock:
-    """Parameters of `antilock`, which acts by wheel deceleration and slip."""
+    """Parameters of the anti-lock system (see `antilock`)."""
 
     select_low: bool = True
     """Whether both rear wheels get the pressure of the wheel with less grip."""
@@ -98,7 +98,7 @@ class Antilock:
 
 @dataclass(frozen=True)
 class TractionControl:
-    """Limits of the driven wheels' slip, which `control_unit` keeps by the engine and the brakes."""
+    """Slip limits of traction control by engine and brakes."""
 
     slip: Annotated[float, Range(0.005, 0.5)] = 0.05
     """Allowed slip, relative to the speed of the wheels that are not driven."""
@@ -200,7 +200,7 @@ def brake_setup(
     inertia_kgm2: Sequence[float],
     differential: Sequence[bool],
 ) -> NDArray[Any]:
-    """Return the constants of a car's brakes, a `BRAKE_SETUP` of shape (1,), with rows in the order of `CORNERS`."""
+    """Return the constants of a car's brakes as a `BRAKE_SETUP` record, with rows in the order of `CORNERS`."""
     setup = np.zeros(1, BRAKE_SETUP)
     for part, names in ((brakes.hydraulics, _HYDRAULICS), (brakes.antilock, _ANTILOCK), (brakes.traction, _TRACTION)):
         for name in names:
@@ -219,7 +219,7 @@ def brake_setup(
 
 
 def reset(state: NDArray[Any], setup: NDArray[Any], speed_mps: float) -> None:
-    """Release the brakes, a `BRAKE_STATE` of shape (1,), of a car that rolls at a speed."""
+    """Reset a `BRAKE_STATE` record to released brakes in a car that rolls at a speed."""
     state[:] = 0
     state["limit_Pa"] = state["allowed_Pa"] = setup["full_pedal_pressure_Pa"]
     state["drive_limit_Nm"] = NO_LIMIT_NM

@@ -1,4 +1,4 @@
-"""The recorded channels, computed from the engine's raw rows: units, axes, signs.
+"""The recorded channels, computed from the engine's raw rows.
 
 In: raw rows of the engine.
 Out: channels with name, unit and meaning.

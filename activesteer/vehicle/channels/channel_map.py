@@ -1,4 +1,4 @@
-"""The table of all channels of a car, and the computation of their values from raw rows."""
+"""The table of a car's channels, and their computation from raw rows."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class ChannelMap:
         self._arrange()
 
     def _arrange(self) -> None:
-        """Arrange the columns: the motion first, then the signals in their order."""
+        """Arrange the columns: motion first, then the other signals in their order."""
         self.channels = (*MOTION_CHANNELS, *(signal.channel for signal in self._signals))
         values = [*(self._motion_copied.get(channel.name) for channel in MOTION_CHANNELS)]
         self._motion = [(place, MOTION_CHANNELS[place].name) for place, value in enumerate(values) if value is None]
@@ -103,16 +103,16 @@ class ChannelMap:
         self._late = np.array([place for place, *_ in (*self._motion, *self._computed)], np.intp)
 
     def signals(self) -> list[Signal]:
-        """Return the channels with their rules, without the motion that `CarMotion` computes."""
+        """Return the channels with their rules, except the motion (see `CarMotion`)."""
         channels = (channel for channel in MOTION_CHANNELS if channel.name in self._motion_copied)
         return [*(Signal(channel, self._motion_copied[channel.name]) for channel in channels), *self._signals]
 
     def inputs(self, count: int) -> Array:
-        """Allocate `count` rows for the intermediate values between `take` and `compute`."""
+        """Allocate rows for the intermediate values between `take` and `compute`."""
         return np.empty((count, len(self._inputs)), order="F")
 
     def take(self, rows: RawRows, out: Array, inputs: Array) -> bool:
-        """Compute the channels of compiled code, best for few rows that are still in the processor's caches."""
+        """Compute the compiled channels. Call it for few rows, while they are in the processor's caches."""
         count = self._checked(inputs, out)
         for name, array, width in zip(RawRows._fields, rows, self._widths, strict=True):
             if not _is_matrix(array, count, width) or (width > 1 and array.strides[1] != array.itemsize):
@@ -122,7 +122,7 @@ class ChannelMap:
         )
 
     def compute(self, inputs: Array, out: Array, last_yaw_rad: float = 0.0) -> bool:
-        """Compute the channels of numpy, best for many rows at a time."""
+        """Compute the channels of NumPy. Call it for many rows."""
         self._checked(inputs, out)
         # The last rows of a diverged run are not finite; record them without a warning.
         with np.errstate(invalid="ignore", over="ignore"):
@@ -134,7 +134,7 @@ class ChannelMap:
         return within(out, self._late, MAX_VALUE)
 
     def evaluate(self, rows: RawRows) -> Array:
-        """Return all channels of n raw rows, shape (n, len(channels)), with the first yaw angle within half a turn."""
+        """Return all channels of raw rows, shape (n, channels), with the first yaw angle within half a turn."""
         count = len(rows.sensordata)
         out, inputs = np.empty((count, len(self.channels)), order="F"), self.inputs(count)
         self.take(rows, out, inputs)
@@ -142,7 +142,7 @@ class ChannelMap:
         return out
 
     def _checked(self, inputs: Array, out: Array) -> int:
-        """Check the arrays that `take` and `compute` write, and return their number of rows."""
+        """Check the output arrays of `take` and `compute`, and return their number of rows."""
         count = len(out) if isinstance(out, np.ndarray) and out.ndim else 0
         for name, array, width in (("out", out, len(self.channels)), ("inputs", inputs, len(self._inputs))):
             if not _is_matrix(array, count, width) or array.shape[1] != width or array.strides[0] != array.itemsize:
@@ -151,7 +151,7 @@ class ChannelMap:
 
 
 def _is_matrix(array: object, rows: int, columns: int) -> bool:
-    """Return whether an array holds this many rows, and at least this many columns, of writable float64."""
+    """Return whether an array is writable float64 with enough rows and columns."""
     return (
         isinstance(array, np.ndarray)
         and array.dtype == np.float64
@@ -167,7 +167,7 @@ def _form(array: object) -> str:
 
 
 def _widths(wanted: list[tuple[int, Values]], inputs: Iterable[Column]) -> list[int]:
-    """Return how many columns of each array of `RawRows` compiled code reads."""
+    """Return the number of columns of each array of `RawRows` that compiled code reads."""
     columns = [*inputs, *(value for _, value in wanted if isinstance(value, Column))]
     for _, value in wanted:
         if isinstance(value, AxialForce):
@@ -179,13 +179,13 @@ def _widths(wanted: list[tuple[int, Values]], inputs: Iterable[Column]) -> list[
 
 
 def _copies(wanted: list[tuple[Column, int]]) -> tuple[NDArray[np.intp], ...]:
-    """Tables of the copied columns for `take_rows`: end of each array's part, columns, places."""
+    """Tables of the copied columns for `take_rows`: array ends, columns and target columns."""
     order = sorted((RawRows._fields.index(array), column, place) for (array, column), place in wanted)
     arrays, columns, places = np.array(order, np.intp).reshape(-1, 3).T.copy()
     return np.searchsorted(arrays, np.arange(len(RawRows._fields)), side="right"), columns, places
 
 
 def _of_kind(kind: type[AxialForce | Actuator], wanted: list[tuple[int, Any]]) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    """Tables of a kind of channel for `take_rows`: the laws, and the places of the channels."""
+    """Tables of a kind of channel for `take_rows`: laws, and target columns."""
     laws = [(values, place) for place, values in wanted if isinstance(values, kind)]
     return np.array([law for law, _ in laws], record_of(kind)), np.array([place for _, place in laws], np.intp)

@@ -1,4 +1,4 @@
-"""Channels of the corners, the motion of the car, steering, actuators and links."""
+"""Channels of corners, car motion, steering, actuators and links."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def corner_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
 
 def brake_signals() -> Iterator[Signal]:
-    """Yield the pressures, and the signals of the control unit of the brakes."""
+    """Yield the brake pressures, and the signals of the brake control unit."""
     for field, (name, meaning) in zip(_BRAKE_FIELDS, _MEANINGS["brakes"].items(), strict=True):
         first = PLACES[field]
         if field not in PER_WHEEL:
@@ -74,12 +74,12 @@ def brake_signals() -> Iterator[Signal]:
 
 
 def toe(forward: Array, left: Array) -> Array:
-    """Return the steer angle of a wheel from two components of its spin axis in chassis axes [rad]."""
+    """Return the steer angle of a wheel from its spin axis [rad]."""
     return np.arctan2(-forward, left)
 
 
 def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) -> tuple[Values, Values, Values]:
-    """Return travel, steer angle and camber from the sensors of a wheel's height and spin axis."""
+    """Return travel, steer angle and camber of a wheel from its height and spin axis."""
     return (
         Computed(lambda height_m: height_m - design_m, (height,)),
         Computed(toe, axis[:2]),
@@ -88,7 +88,7 @@ def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) 
 
 
 def design_heights_m(model: mujoco.MjModel) -> list[float]:
-    """Return the heights of the wheel centres in vehicle axes in the design position, order of `CORNERS` [m]."""
+    """Return the design heights of the wheel centres in vehicle axes [m], order of `CORNERS`."""
     at_rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, at_rest)
     chassis = model.body("chassis").id
@@ -113,7 +113,7 @@ MOTION_CHANNELS: Final = tuple(
 
 
 def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
-    """Return the channels of `MOTION_CHANNELS` that are copied from the engine's sensors."""
+    """Return the motion channels that are copied from the engine's sensors."""
     x, y, z = sensor(model, "cg_position")
     front_x, front_y, _ = sensor(model, "front_axle_position")
     _, _, vertical = sensor(model, "cg_velocity")
@@ -125,7 +125,7 @@ def motion_copied(model: mujoco.MjModel) -> dict[str, Column]:
 
 
 def motion_inputs(model: mujoco.MjModel) -> tuple[Column, ...]:
-    """Return the inputs of the other channels: orientation, velocity, acceleration, two of the body's angular rates."""
+    """Return the inputs of the computed motion channels: orientation, velocity, acceleration and body rates."""
     orientation, velocity, acceleration, rates = (
         sensor(model, name) for name in ("chassis_orientation", "cg_velocity", "cg_accelerometer", "cg_gyro")
     )
@@ -137,7 +137,7 @@ _ARRAY: Final = types.Array(types.float64, 2, "A")
 
 @inlined
 def angle_sides(w, x, y, z):
-    """Return opposite and adjacent side of yaw and of roll, and the sine of pitch (ISO 8855: yaw, pitch, roll)."""
+    """Return sines and cosines of yaw and roll up to a factor, and the sine of pitch (ISO 8855)."""
     sine = 2.0 * (w * y - x * z)
     return (
         2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
@@ -147,7 +147,7 @@ def angle_sides(w, x, y, z):
 
 @inlined
 def in_the_road_plane(vx, vy, ax, ay, az, about_y, about_z, sin, sr, sp, cos, cr, cp, gravity_mps2):
-    """Return velocity (two), acceleration (three) and yaw rate from sines and cosines of yaw, roll and pitch."""
+    """Return velocity, acceleration and yaw rate from sines and cosines of the angles."""
     # An accelerometer measures the specific force. After rotation into the road plane, add gravity, which has a
     # component in this plane on a grade or a bank.
     along = cp * ax + sp * (sr * ay + cr * az) + gravity_mps2[0] * cos
@@ -164,7 +164,7 @@ def in_the_road_plane(vx, vy, ax, ay, az, about_y, about_z, sin, sr, sp, cos, cr
 
 @inlined
 def sideslip_share(speed, along):
-    """Return the fraction of the sideslip angle that is recorded at a speed and a velocity along the car [m/s]."""
+    """Return the fraction of the sideslip angle to record at low or backward speed."""
     if along < 0.0:
         return 1.0 if speed > ROCKS_BACK_MPS else 0.0
     return min(max((speed - STANDSTILL_MPS) / (FULL_SIDESLIP_MPS - STANDSTILL_MPS), 0.0), 1.0)
@@ -172,7 +172,7 @@ def sideslip_share(speed, along):
 
 @compiled_call(types.void, _ARRAY, _ARRAY)
 def _all_angle_sides(columns, out):
-    """Write opposite sides, adjacent sides and sine of all rows."""
+    """Write the sines and cosines of all rows."""
     for row in range(len(columns)):
         out[row, 0], out[row, 2], out[row, 1], out[row, 3], out[row, 4] = angle_sides(
             columns[row, 0], columns[row, 1], columns[row, 2], columns[row, 3]
@@ -202,7 +202,7 @@ class CarMotion:
     """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
 
     def __init__(self, columns: Array, gravity_mps2: Array, last_yaw_rad: float) -> None:
-        """Evaluate all quantities, which have the names of their channels.
+        """Evaluate all motion channels, by name.
 
         Sines and angles use numpy, which computes eight at a time; recordings keep its last digits.
         """
@@ -226,7 +226,7 @@ class CarMotion:
 
 
 def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """Yield torques of drive and brakes, dry friction, and flags of servos without a motor that are at a limit."""
+    """Yield torques of drive and brakes, dry friction, and limit flags of servos."""
     for index in range(model.nu):
         name, force = model.actuator(index).name, Column("actuator_force", index)
         if name.endswith(("_drive", "_brake")):
@@ -247,7 +247,7 @@ def actuator_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
 
 def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
-    """Yield the signals of the motors of screws in the toe links, and of the superposition."""
+    """Yield the signals of the actuator motors: toe link screws and superposition."""
     for name, words in (
         ("rl", "of the left toe link"), ("rr", "of the right toe link"), ("rear", "of both toe links"),
         (NAME, "of the superposition"),
@@ -268,7 +268,7 @@ def motor_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
 
 def electric_signals(motors: Motors) -> Iterator[Signal]:
-    """Yield the signals of electric motors on wheels or axles, and of their battery."""
+    """Yield the signals of the electric drive and its battery."""
     if not list(motors):
         return
     place = itertools.count()
@@ -285,7 +285,7 @@ def _has_motor(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _state(model: mujoco.MjModel, name: str) -> Column:
-    """The activation of an actuator."""
+    """Activation of an actuator."""
     return Column("act", int(model.actuator_actadr[model.actuator(name).id]))
 
 
@@ -315,7 +315,7 @@ def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
 
 
 def _force(model: mujoco.MjModel, tendon: int) -> Values:
-    """Return the axial force of a tendon, with the actuator force of a screw in the link."""
+    """Return the axial force of a tendon, including a screw in the link."""
     law = axial_force(model, tendon)
     along = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
     screws = np.flatnonzero(along & (model.actuator_trnid[:, 0] == tendon) & (model.actuator_gainprm[:, 0] > 0.0))

@@ -1,4 +1,4 @@
-"""Channels from raw rows, in compiled code.
+"""Channels computed from raw rows in compiled code.
 
 The code works on a few rows at a time. Raw rows lie one after the other, and so do channels, so the data that the
 processor fetches for one channel is still in its cache for the next.
@@ -22,7 +22,7 @@ from activesteer.vehicle.force_block import sensor_columns
 
 
 class RawRows(NamedTuple):
-    """Copies of the engine's arrays and the commands, one row a step, all of the same time."""
+    """Copies of the engine's arrays and the commands, one row per step."""
 
     sensordata: Array
     userdata: Array
@@ -48,7 +48,7 @@ ENGINE_ARRAYS: Final = RawRows._fields[: RawRows._fields.index("commands")]
 
 
 class Column(NamedTuple):
-    """A column of one of the arrays of `RawRows`, recorded as it is."""
+    """A column of one of the arrays of `RawRows`, copied unchanged."""
 
     array: str
     column: int
@@ -89,7 +89,7 @@ class Actuator(NamedTuple):
 
 
 class Computed(NamedTuple):
-    """A channel that numpy computes from columns, which are the arguments of `law`."""
+    """A channel that NumPy computes with `law` from columns."""
 
     law: Callable[..., Array]
     columns: tuple[Column, ...]
@@ -106,14 +106,14 @@ def sensor(model: mujoco.MjModel, name: str) -> tuple[Column, ...]:
 
 
 class Signal(NamedTuple):
-    """A channel, and the rule that gives its values."""
+    """A channel with the rule for its values."""
 
     channel: Channel
     values: Values
 
 
 def signal(group: str, name: str, meaning: str, values: Values) -> Signal:
-    """Return a signal of a channel that is stored with 32 bits (see `Channel`), in the unit at the end of its name."""
+    """Return the signal of a channel with 32 bits, in the unit at the end of its name."""
     return Signal(Channel(name, unit_of(name), meaning, group), values)
 
 
@@ -140,7 +140,7 @@ _LENGTH, _VELOCITY, _CTRL, _ACT, _FORCE = (
 
 @inlined
 def _place(array, row, column):
-    """Pointer to a number, without the check for negative indices in numba's indexing."""
+    """Pointer to a number, which avoids numba's check for negative indices."""
     return f64_pointer(array.ctypes.data + row * array.strides[0] + column * array.strides[1])
 
 
@@ -172,7 +172,7 @@ def axial_force(length, velocity, low, high, first, second, third, damping):
 
 @inlined
 def is_limited(law, command, activation, force):
-    """Return 1 for an actuator at a limit of angle, rate or force, else 0 (see `Actuator`)."""
+    """Return 1 for an actuator at a limit, else 0 (see `Actuator`)."""
     target = min(max(command, law.low_rad), law.high_rad)
     rate = (target - activation) / law.lag_s
     beyond = command < law.low_rad or command > law.high_rad or abs(rate) >= law.rate_radps
@@ -231,7 +231,7 @@ def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, larges
 
 @compiled_call(types.boolean, _ARRAY, _PLACES, types.float64)
 def within(values, columns, largest):
-    """Return whether all values in some columns are finite and within a magnitude."""
+    """Return whether all values in some columns are finite and small enough."""
     good = True
     for index in range(len(columns)):
         column = values[:, columns[index]]
