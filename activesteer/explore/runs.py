@@ -22,13 +22,13 @@ from activesteer.analysis.report.groups import groups_of
 from activesteer.analysis.report.run_page import write_report
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
-from activesteer.core.conventions import CORNERS, run_looks
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, run_looks
 from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed, height_colours
 from activesteer.drawing.panels import EXPLORE
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
 from activesteer.plugins import Declared, Plugin
@@ -227,7 +227,6 @@ class Runs:
         self._held_rad: dict[tuple[str, str], float] = {}
         self._kept: dict[str, tuple[str, Recording]] = {}  # name -> label and recording of its last run
         self._limits_of: tuple[Any, dict[str, tuple[float, float]]] = None, {}
-        self._choice: tuple[Choice, dict[str, float]] | None = None
 
     def describe(self, choice: Describe) -> Reply:
         """Return the sliders and the car of a choice."""
@@ -248,19 +247,17 @@ class Runs:
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
-        self._kept, self._choice = {}, None  # what fails from here on leaves nothing to save
+        self._kept = {}  # what fails from here on leaves nothing to save
         self.folder.check(choice)
-        overrides = choice.values
-        check_numbers(overrides, self._limits(choice))
-        scenario, held = self._held(choice, self._resolved(choice, overrides))
+        check_numbers(choice.values, self._limits(choice))
+        scenario, overrides, held, note = self._held(choice, choice.values)
         looks = run_looks(choice.controllers)
-        self._choice = choice, overrides
         road = scenario.maneuver.road
         mu = None if is_overruled(road, "mu") else road.mu
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
-            run["title"] = (scenario.maneuver.title or choice.maneuver) + held
+            run |= {"title": (scenario.maneuver.title or choice.maneuver) + held, "note": note}
             try:
                 controller = controller_spec(self.folder.located(name))
                 recording = self._driven(scenario, controller, stale)
@@ -318,17 +315,32 @@ class Runs:
             self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         return self._limits_of[1]
 
-    def _held(self, choice: RunRequest, scenario: Scenario) -> tuple[Scenario, str]:
-        """Return a scenario with its amplitude, and words for its title.
+    def _held(self, choice: RunRequest, overrides: dict[str, float]) -> tuple[Scenario, dict[str, float], str, str]:
+        """Return a scenario with its amplitude, its overrides, words for its title, and a note for the reader.
 
-        While a slider moves, the amplitude is that of the last search, else a new one.
+        While a slider moves, the amplitude is that of the last search, else a new one. If a new search fails, the
+        amplitude stays, and becomes an override.
         """
-        key = choice.maneuver, choice.vehicle
-        held = choice.dragging and key in self._held_rad
-        if not held and (angle_rad := searched_angle(scenario)) is not None:
-            self._held_rad[key] = angle_rad
-        found = with_amplitude_found(scenario, angle_rad=self._held_rad.get(key))
-        return found, " (amplitude as before, until you let go)" if held else ""
+        scenario, key = self._resolved(choice, overrides), (choice.maneuver, choice.vehicle)
+        if choice.dragging and key in self._held_rad:
+            found = with_amplitude_found(scenario, angle_rad=self._held_rad[key])
+            return found, overrides, " (amplitude as before, until you let go)", ""
+        try:
+            if (angle_rad := searched_angle(scenario)) is not None:
+                self._held_rad[key] = angle_rad
+            return with_amplitude_found(scenario, angle_rad=angle_rad), overrides, "", ""
+        except ManeuverError:
+            search = scenario.maneuver.search
+            if search is None:
+                raise
+            if key not in self._held_rad and (angle_rad := searched_angle(self._resolved(choice, {}))) is not None:
+                self._held_rad[key] = angle_rad
+        fixed, angle_deg = _fixed_amplitude(with_amplitude_found(scenario, angle_rad=self._held_rad[key]), overrides)
+        note = (
+            f"On this road, the car does not reach {search.lateral_acceleration_mps2 / GRAVITY_MPS2:.2g} g without "
+            f"control. Therefore, the steering wheel angle stays at {angle_deg:.0f} deg."
+        )
+        return with_amplitude_found(self._resolved(choice, fixed)), fixed, "", note
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
         """Return the recording of a run, or None if a newer choice has arrived."""
@@ -359,6 +371,24 @@ class Runs:
         names = json.dumps(list(driven))
         python = f"runs = [activesteer.simulate({json.dumps(choice.maneuver)}, name{more}) for name in {names}]"
         return {"command": shlex.join(words), "python": python}
+
+
+_SEARCHED: Final = {"steer": "steering_wheel", "turn": "steering_wheel", "": "reference_angle"}
+"""Table of a manoeuvre, or none -> key of the steering wheel angle that a search finds, without its unit."""
+
+
+def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Return overrides that give the amplitude of a scenario without a search, and the amplitude [deg]."""
+    maneuver: Any = scenario.maneuver
+    for table, name in _SEARCHED.items():
+        owner = getattr(maneuver, table, None) if table else maneuver
+        angle_rad = getattr(owner, f"{name}_rad", None)
+        if angle_rad is not None:
+            angle_deg = float(f"{math.degrees(angle_rad):g}")  # as the command repeats it
+            useless = {f"{table}.{key}" for key in getattr(owner, "OVERRULED", {})}
+            kept = {key: value for key, value in overrides.items() if key not in useless}
+            return {**kept, f"{table}.{name}_deg".lstrip("."): angle_deg}, angle_deg
+    raise ManeuverError(f"{maneuver.name}: the amplitude of this manoeuvre has no key")
 
 
 def free_path(folder: Path, stem: str, suffix: str) -> Path:

@@ -126,6 +126,7 @@ const hear = {
   description(header, arrays) {
     if (header.id !== state.id) return;
     showTitle(header.title);
+    $("note").textContent = "";
     state.sliders = header.sliders;
     const limited = [];
     for (const { key, label, unit, low, high } of header.sliders) if (key in state.wanted) {
@@ -146,6 +147,7 @@ const hear = {
   run(header, arrays) {
     if (header.id !== state.id) return;
     showTitle(header.title);
+    $("note").textContent = header.note ?? "";
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) { state.failed = state.id; say(`${header.name}: ${header.error}`); }

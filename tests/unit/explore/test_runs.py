@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.errors import ManeuverError, ParameterError
+from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
 from activesteer.explore.runs import Reply, Runs
@@ -51,6 +51,43 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
 
 
 @pytest.mark.parametrize(
+    ("maneuver", "key", "values"),
+    [
+        ("sine_with_dwell", "steer.steering_wheel_deg", {"road.mu": 0.35, "steer.amplitude_factor": 4.0}),
+        ("step_steer", "steer.steering_wheel_deg", {"road.mu": 0.2}),
+        ("fishhook", "reference_angle_deg", {"road.mu": 0.3}),
+        ("brake_in_turn", "turn.steering_wheel_deg", {"road.mu": 0.3}),
+    ],
+)
+def test_a_search_that_fails_keeps_the_amplitude_which_command_and_title_give(
+    maneuver: str, key: str, values: dict[str, float], tmp_path: Path
+) -> None:
+    def steering(run: Reply) -> Any:
+        wheel = next(panel for panel in run.header["plots"]["panels"] if panel["title"].startswith("Steering wheel"))
+        return wheel["series"][0]["values"]
+
+    runs = Runs(Folder(tmp_path))
+    choice = {"maneuver": maneuver, "controllers": ("none",)}
+    (dry, _) = runs.run(RunRequest(**choice), lambda: False)
+    (held, _) = runs.run(RunRequest(**choice, values=values, dragging=True), lambda: False)
+    (kept, done) = runs.run(RunRequest(**choice, values=values), lambda: False)
+    assert steering(kept) == pytest.approx(steering(held), abs=0.02)
+    assert "does not reach" in kept.header["note"]
+    assert dry.header["note"] == held.header["note"] == ""
+    angle = float(done.header["command"].partition(f"{key}=")[2].split()[0])
+    assert "dry" not in kept.header["title"]
+    if maneuver != "fishhook":  # its title is in words
+        assert f"{angle:.3g} deg" in kept.header["title"]
+        assert f" {angle:.0f} deg" in kept.header["note"]
+    repeated = {**values, key: angle}
+    repeated.pop("steer.amplitude_factor", None)
+    again = activesteer.simulate(maneuver, "none", overrides=repeated)
+    assert math.degrees(np.abs(again["steering_wheel_rad"]).max()) == pytest.approx(
+        np.abs(np.array(steering(kept), float)).max(), abs=0.05
+    )
+
+
+@pytest.mark.parametrize(
     "maneuver",
     [pytest.param(name, marks=[] if name in SEARCHING else pytest.mark.slow) for name in list_maneuvers()],
 )
@@ -72,8 +109,8 @@ def test_what_has_failed_leaves_nothing_to_save_and_a_command_names_the_controll
     assert "-c none" in done.header["command"]
     assert "tv" not in done.header["command"]  # this car has no electric axle
     assert len(runs.save().header["files"]) == 1
-    with pytest.raises(ManeuverError, match="too slippery"):
-        list(runs.run(RunRequest(maneuver="step_steer", values={"road.mu": 0.2}), lambda: False))
+    with pytest.raises(ParameterError, match="must be"):
+        list(runs.run(RunRequest(maneuver="step_steer", values={"road.mu": 9.0}), lambda: False))
     with pytest.raises(ParameterError, match="no run to save"):
         runs.save()
 
