@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.harm import losses
+from activesteer.analysis.harm import LOST, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
@@ -27,7 +27,7 @@ from activesteer.core.metric_table import Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed, height_colours
-from activesteer.drawing.panels import EXPLORE
+from activesteer.drawing.panels import EXPLORE, PANELS
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
@@ -207,6 +207,7 @@ def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], 
     return drawn.plane_below_m, (corners_m.astype(np.float32), factors.astype(np.float32), triangles.astype(np.float32))
 
 
+_SIDESLIP: Final = PANELS["sideslip"].title
 _CHUNK: Final = 500
 """Steps between two looks for a newer choice; about 10 ms."""
 
@@ -268,12 +269,12 @@ class Runs:
                 return
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
-            shown = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
+            drawn = _within_half_turn(plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE))
             run["losses"] = list(losses(recording.metrics))
             surface: tuple[NDArray[np.float32], ...] = ()
             if len(self._kept) == 1 and not choice.dragging:  # all runs have the same road
                 run["ground_m"], surface = surface_of(recording)
-            shown_run = {**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}
+            shown_run = {**run, "plots": drawn, "figures": _figures(recording), "pose_step_s": step_s}
             yield Reply(shown_run, (poses, *surface))
         yield Reply({"kind": "finished", **self._commands(choice, overrides, list(self._kept))})
 
@@ -405,6 +406,17 @@ def _plain(name: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in name)[:100]
 
 
+def _within_half_turn(drawn: dict[str, Any]) -> dict[str, Any]:
+    """Return plots whose sideslip angles are within 180 deg, with a gap where the angle changes its sign there."""
+    for series in (one for panel in drawn["panels"] if panel["title"] == _SIDESLIP for one in panel["series"]):
+        unwrapped = np.array(series["values"], float)  # None is nan
+        if np.nanmax(np.abs(unwrapped), initial=0.0) > 180.0:
+            turns = np.round(unwrapped / 360.0)
+            wrapped = np.where(np.diff(turns, prepend=turns[:1]) == 0.0, unwrapped - 360.0 * turns, np.nan)
+            series["values"] = [None if math.isnan(value) else round(value, 2) for value in wrapped.tolist()]
+    return drawn
+
+
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
     found = []
@@ -413,9 +425,11 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
         if name is not None:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
-            shown = size if math.isfinite(size) else None
+            is_lost = shown(name, recording.metrics, "") == LOST
             # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
             fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
             digits = 0 if metric.whole else 3 if fine else None
-            found.append({"title": title, "unit": metric.unit_name, "value": shown, "digits": digits})
+            known = size if math.isfinite(size) and not is_lost else None
+            figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
+            found.append(figure)
     return found

@@ -243,12 +243,12 @@ function showTitle(title) {
 
 function showFigures() {
   showColours();
-  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
+  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value, lost }) => value != null || lost).map((figure) => [figure.title, figure])));
   const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);
-    return element("td", {}, number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
+    return element("td", {}, now?.lost ? "lost" : number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   const failed = runs.filter((run) => run.losses.length);
   rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("th", {}, swatchOf(run), `${shortName(run)} fails`), element("td", { colspan: runs.length }, run.losses.join("; ")))));

@@ -2,7 +2,7 @@
 class FakeElement {
   constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle() {} }; }
   setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
-  append(...children) { this.children.push(...children.filter((child) => child instanceof FakeElement)); }
+  append(...children) { this.words = [this.words ?? "", ...children.filter((child) => typeof child === "string")].join(""); this.children.push(...children.filter((child) => child instanceof FakeElement)); }
   replaceChildren(...children) { this.children = children; }
   addEventListener(kind, act) { (this.listeners[kind] ??= []).push(act); }
   fire(kind, about = {}) { for (const act of this.listeners[kind] ?? []) act({ preventDefault() {}, ...about }); }

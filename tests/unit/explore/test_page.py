@@ -160,6 +160,19 @@ def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> Non
     assert "speed_kmh=95" in page["address"]
 
 
+def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const of = (lost, value) => [{ title: "Peak sideslip", unit: "deg", value, digits: null, lost }];
+        const id = sent.at(-1)?.id ?? before.at(-1).id;
+        hear({ kind: "run", id, name: "none", title: "", figures: of(true, null), losses: [] }, [undefined]);
+        hear({ kind: "run", id, name: "ars", title: "", figures: of(true, null), losses: [] }, [undefined]);
+        hear({ kind: "run", id, name: "afs", title: "", figures: of(false, 3), losses: [] }, [undefined]);
+        $("saved").textContent = JSON.stringify($("figures").querySelectorAll("td").map(({ words }) => words));""",
+    )
+    assert json.loads(page["saved"]) == ["lost", "lost", "3.00"]
+
+
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
     reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"

@@ -128,6 +128,24 @@ def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
     assert held["losses"] == []
 
 
+def test_a_car_that_turns_round_has_its_sideslip_within_half_a_turn_and_no_figures(tmp_path: Path) -> None:
+    choice = RunRequest(maneuver="sine_with_dwell", controllers=("none",), values={"steer.amplitude_factor": 8.0})
+    runs = Runs(Folder(tmp_path))
+    run, _ = runs.run(choice, lambda: False)
+    runs.save()
+    recorded_deg = np.degrees(activesteer.Recording.open(tmp_path / "sine_with_dwell-none.mcap")["sideslip_rad"])
+    assert np.abs(np.unwrap(recorded_deg, period=360.0)).max() > 185.0  # it turns round
+    panel = next(panel for panel in run.header["plots"]["panels"] if panel["title"] == "Sideslip angle")
+    drawn = np.array(panel["series"][0]["values"], float)
+    assert np.nanmax(np.abs(drawn)) <= 180.0
+    assert drawn[0] == pytest.approx(recorded_deg[0], abs=0.1)
+    assert drawn[-1] == pytest.approx(recorded_deg[-1], abs=0.5)  # the last one that is drawn
+    assert 0 < np.isnan(drawn).sum() <= 3  # a gap, and not a line across the plot
+    figures = {figure["title"]: figure for figure in run.header["figures"]}
+    assert figures["Peak sideslip"]["lost"]
+    assert figures["Peak sideslip"]["value"] is None
+
+
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:
     looks = iter([False] * 3 + [True] * 10)
     assert list(Runs(Folder(tmp_path)).run(RunRequest(**CHOICE), lambda: next(looks))) == []
