@@ -232,8 +232,10 @@ class DriveSession:
             "steering_wheel_deg": math.degrees(loop.measurement.steering_wheel_rad),
             "sideslip_deg": sideslip_deg,
             "yaw_rate_degps": math.degrees(motion.yaw_rate_radps), "ay_mps2": truth["ay_mps2"],
-            "rear_deg": math.degrees(loop.measurement.rear_steer_rad),
-            "superposition_deg": math.degrees(loop.measurement.superposition_rad),
+            # None while the controller demands no such angle: what is left is the give of a hinge.
+            "rear_deg": math.degrees(loop.measurement.rear_steer_rad) if truth["rear_steer_demand_rad"] else None,
+            "superposition_deg": math.degrees(loop.measurement.superposition_rad)
+            if truth["superposition_demand_rad"] else None,
             "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
             "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
             "cones": fallen, "penalty_s": penalty_s,

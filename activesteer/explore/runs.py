@@ -19,7 +19,6 @@ from activesteer.analysis.harm import LOST, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.run_page import write_report
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, run_looks
@@ -287,10 +286,9 @@ class Runs:
             paths.append(path)
         return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
 
-    def report(self, path: Path) -> Reply:
-        """Write a report of the last runs."""
-        write_report({f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}, path)
-        return Reply({"kind": "report"})
+    def driven(self) -> dict[str, Recording]:
+        """Return the recordings of the last runs by the names of their files in a report."""
+        return {f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}
 
     def _runs(self) -> dict[str, tuple[str, Recording]]:
         if not self._kept:

@@ -24,7 +24,7 @@ export class Drive {
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
     $("drive-controller").addEventListener("change", () => this.control($("drive-controller").value));
-    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); this.compared = false; }]]) {
+    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.start_mu = +$("drive-mu").value; this.act({ mu: this.start_mu }); this.compared = false; }]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
       $(id).addEventListener("change", () => { if (!this.running) { this.startAt(+$("drive-speed").value, +$("drive-mu").value); this.prepare(); } });
     }
@@ -32,7 +32,8 @@ export class Drive {
     $("hold").addEventListener("change", () => this.hold());
     $("start").addEventListener("click", () => this.act({ go: true }, true));
     $("end").addEventListener("click", () => this.end());
-    $("again").addEventListener("click", () => this.prepare());
+    $("again").addEventListener("click", () => this.restart());
+    $("drive-report").addEventListener("click", () => this.socket.send({ kind: "report", drive: true }));
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
@@ -74,8 +75,9 @@ export class Drive {
 
   // On a small screen, the choices fold away while the car drives; a short one has no room for them before.
   fold() {
-    document.body.classList.toggle("driving", this.running);
-    $("drive-setup").open = !(short.matches || (this.running && small.matches));
+    const driving = this.running || this.again;
+    document.body.classList.toggle("driving", driving);
+    $("drive-setup").open = !(short.matches || (driving && small.matches));
   }
 
   show(shown) {
@@ -97,7 +99,7 @@ export class Drive {
     this.startAt(course.speed_kmh, course.mu);
   }
 
-  // Speed and friction at the start, to which a restart returns.
+  // Speed and friction at the start. A restart returns to this speed, and keeps the friction chosen while driving.
   startAt(speed_kmh, mu) {
     this.start_kmh = speed_kmh;
     this.start_mu = mu;
@@ -115,16 +117,30 @@ export class Drive {
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
-    this.startAt(this.start_kmh, this.start_mu); // they may have moved during the drive
+    this.again = false;
+    this.startAt(this.start_kmh, this.start_mu); // the speed may have moved during the drive
     history.replaceState(null, "", `#${this.address}`);
     this.ready = false;
     $("driven").textContent = ""; // of the last drive, perhaps of another course
+    $("drive-report").hidden = true;
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
     this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: this.start_kmh, mu: this.start_mu });
   }
 
-  failed() { $("start").textContent = "Cannot drive: choose another control or car"; }
+  // Put the car at the start again, where it drives off at once.
+  restart() {
+    if (!this.ready) return;
+    this.prepare();
+    this.again = true;
+  }
+
+  failed() {
+    this.again = false;
+    this.fold();
+    $("waiting").hidden = false;
+    $("start").textContent = "Cannot drive: choose another control or car";
+  }
 
   begin(header, arrays) {
     if (header.id !== this.asked) return;
@@ -142,6 +158,7 @@ export class Drive {
     this.frames = [];
     this.struck = this.passed = this.penalty_s = 0;
     this.previous = null;
+    if (this.again) { this.act({ go: true }, true); return; }
     $("waiting").hidden = false;
     $("start").disabled = false;
     $("start").textContent = `Drive at ${number(+$("drive-speed").value, 0)} km/h`;
@@ -150,13 +167,14 @@ export class Drive {
 
   going() {
     this.running = this.compared = true;
-    this.pressed.clear();  // a key that was let go after the last drive
+    this.again = false;
     this.fold();
     this.latencies = [];
     $("start").blur();
     $("waiting").hidden = true;
     $("end").hidden = $("again").hidden = false;
     $("driven").textContent = "";
+    $("drive-report").hidden = true;
     this.hold();
   }
 
@@ -170,15 +188,18 @@ export class Drive {
   hold() { this.act({ speed_kmh: $("hold").checked ? +$("drive-speed").value : null }); }
 
   key(event, down) {
-    if (!this.shown || !this.running || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (down && event.key === "Escape") { this.end(); return; }
-    if (down && event.key.toLowerCase() === "r") { this.prepare(); return; } // also the way back from off the course
+    const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!down) this.pressed.delete(what);
+    if (!this.shown || event.ctrlKey || event.metaKey || event.altKey) return;
+    // Before the drive, a key that is held counts, but a list or a slider keeps its own keys.
+    if (!this.running && (["INPUT", "SELECT"].includes(event.target?.tagName) || event.key === " ")) return;
+    if (down && event.key === "Escape") { if (this.running) this.end(); return; }
+    if (down && event.key.toLowerCase() === "r") { if (this.running && !event.repeat) this.restart(); return; } // also the way back from off the course
     const place = Number(event.key) - 1;
     if (down && SWITCH[place]) { this.control(SWITCH[place]); return; }
-    const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!what) return;
     event.preventDefault();
-    if (down) this.pressed.add(what); else this.pressed.delete(what);
+    if (down) this.pressed.add(what);
     this.hands();
   }
 
@@ -244,20 +265,24 @@ export class Drive {
   }
 
   gauges(header) {
+    if (header.controller !== this.controlled) { this.controlled = header.controller; this.rear = this.front = false; }
+    this.rear ||= header.rear_deg != null;
+    this.front ||= header.superposition_deg != null;
     const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
-      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(Math.min(100, 100 * header.friction_use), 0)} %`,
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
-      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg, 1)}°`,
-      "front steer added": `${number(header.superposition_deg, 1)}°`, control: header.controller,
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg ?? 0, 1)}°`,
+      "front steer added": `${number(header.superposition_deg ?? 0, 1)}°`, control: header.controller,
     };
     if (!$("gauges").children.length) {
-      $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
+      $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: ["speed", "time"].includes(name) ? "large" : PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
     const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
     gauge("cones").hidden = !cones;
-    gauge("rear steer").hidden = cones && small.matches; // a phone has no room for both
+    gauge("rear steer").hidden = !this.rear || (cones && small.matches); // a phone has no room for both
+    gauge("front steer added").hidden = !this.front;
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
@@ -277,6 +302,7 @@ export class Drive {
   ended(header) {
     this.running = false;
     this.fold();
+    if (!this.again) $("waiting").hidden = false;
     this.sent.clear();
     this.last = "";
     $("end").hidden = $("again").hidden = true;
@@ -292,6 +318,7 @@ export class Drive {
     // A small screen has no room for what few want to know.
     $("driven").replaceChildren(`${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
+    $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);
     else if (!this.shown) this.say(`The drive has ended. It is saved as ${header.file}.`, true);
   }

@@ -9,20 +9,29 @@ class FakeElement {
   all() { return this.children.flatMap((child) => [child, ...child.all()]); }
   querySelectorAll(what) { return this.all().filter((one) => (what === "details[open]" ? false : one.name === what)); }
   remove() {}
+  focus() {}
+  blur() {}
+  prepend() {}
+  style = { setProperty() {} };
+  get previousElementSibling() { return (this.before ??= new FakeElement("output")); }
+  get firstElementChild() { return (this.children[0] ??= new FakeElement("g")); }
+  get lastElementChild() { return this.children.at(-1); }
 }
 const named = new Map();
 export const $ = (id) => { if (!named.has(id)) named.set(id, new FakeElement(id)); return named.get(id); };
+Object.defineProperty(globalThis, "navigator", { value: {} });
 Object.assign(globalThis, {
-  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener() {}, matchMedia: () => ({ matches: false }),
+  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener(kind, act) { $("window").addEventListener(kind, act); }, matchMedia: () => ({ matches: false }),
   history: { replaceState: (_state, _title, address) => { location.hash = address; } },
-  document: { getElementById: $, createElement: (name) => new FakeElement(name) },
+  document: { body: new FakeElement("body"), querySelectorAll: () => [], getElementById: $, createElement: (name) => new FakeElement(name) },
 });
 export const sent = [];
 export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
 export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); setShape() {} setSurface() {} draw() {} follow() {} }
+export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} knock() {} lighten() {} draw() {} follow() {} }
+export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };
 export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];

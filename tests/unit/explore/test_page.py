@@ -49,6 +49,97 @@ def used(tmp_path: Path, events: str, address: str = "") -> Any:
     )
 
 
+def driven(tmp_path: Path, events: str) -> Any:
+    """Return the messages of a drive after events, with a fake document and a fake program."""
+    drive = (
+        (PAGE / "drive.js").read_text("utf-8").replace("./look.js", "./fake.mjs").replace("./scene.js", "./fake.mjs")
+    )
+    (tmp_path / "drive.mjs").write_text(drive)
+    (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
+    return script(
+        tmp_path,
+        f"""import {{ $ }} from "./fake.mjs";
+        import {{ Drive }} from "./drive.mjs";
+        const sent = [], drive = new Drive({{ send: (message) => sent.push(message) }}, () => {{}});
+        const key = (name, down = true) => $("window").fire(down ? "keydown" : "keyup", {{ key: name }});
+        const ready = () => drive.begin({{ id: drive.asked, cones: [], radius_m: 0 }}, []);
+        const frame = (more) => drive.frame({{ time_s: 1, speed_kmh: 60, sideslip_deg: 0, friction_use: 1.02,
+          ay_mps2: 0, yaw_rate_degps: 0, steering_wheel_deg: 0, cones: [], controller: "none", hold_kmh: 55,
+          penalty_s: 0, ...more }}, [[0, 0, 0]]);
+        const gauge = (name) => {{
+          const box = $("gauges").children.find((one) => one.children[0].words === name);
+          return box.hidden ? null : box.lastElementChild.textContent;
+        }};
+        $("drive-mu").max = $("drive-speed").max = 200;
+        $("course").value = "slalom";
+        $("drive-vehicle").value = "compact";
+        $("drive-controller").value = "none";
+        $("hold").checked = true;
+        drive.startAt(60, 0.9);
+        drive.show(true);
+        {events}
+        const starts = sent.filter((one) => one.kind === "start");
+        const steered = sent.filter((one) => one.steer != null).map((one) => one.steer);
+        const go = sent.filter((one) => one.go).length, result = globalThis.seen;
+        console.log(JSON.stringify({{
+          sent, starts: starts.map((one) => [one.speed_kmh, one.mu, one.controllers[0]]), steered, go, result }}));""",
+    )
+
+
+GO = "ready(); $('start').fire('click'); drive.going();"
+ENDED = "drive.ended({ time_s: 3, behind_s: 0, file: 'drive.mcap', folder: '/f', error: '' });"
+
+
+def test_a_restart_drives_at_once_with_the_friction_and_the_controller_chosen_while_driving(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} frame();
+        $("drive-mu").value = "0.35"; $("drive-mu").fire("input");
+        key("4"); key("r"); {ENDED} ready(); drive.going();""",
+    )
+    assert page["starts"] == [[60, 0.9, "none"], [60, 0.35, "lqr"]]  # the speed is that of the start
+    assert page["go"] == 2  # without a second press of the button
+    assert driven(tmp_path, f"{GO} frame(); $('end').fire('click'); {ENDED} ready();")["go"] == 1
+
+
+def test_a_key_held_before_the_start_steers_from_the_start(tmp_path: Path) -> None:
+    held = driven(tmp_path, f"key('ArrowLeft'); {GO} drive.hands();")
+    assert held["steered"] == [1]
+    let_go = driven(tmp_path, f"key('ArrowLeft'); key('ArrowLeft', false); {GO} drive.hands();")
+    assert let_go["steered"] == [0]
+    after = driven(tmp_path, f"{GO} frame(); key('a'); key('r'); {ENDED} ready(); drive.going(); drive.hands();")
+    assert after["steered"] == [1, 1]  # still held after a restart
+
+
+def test_a_drive_that_has_ended_can_be_opened_as_a_report(tmp_path: Path) -> None:
+    shown = "$('drive-report').hidden"
+    page = driven(
+        tmp_path,
+        f"""const seen = [{shown}]; {GO} frame(); {ENDED} seen.push({shown}); $("drive-report").fire("click");
+        {GO} seen.push({shown}); globalThis.seen = seen;""",
+    )
+    assert page["result"][1:] == [False, True]
+    assert {"kind": "report", "drive": True} in page["sent"]
+
+
+def test_gauges_show_at_most_all_grip_and_only_angles_that_the_controller_adds(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} globalThis.seen = [];
+        const see = () => seen.push(["grip used", "rear steer", "front steer added"].map(gauge));
+        frame({{ rear_deg: null, superposition_deg: null }}); see();
+        frame({{ controller: "ars", rear_deg: 1.25, superposition_deg: null }}); see();
+        frame({{ controller: "ars", rear_deg: null, superposition_deg: null }}); see();
+        frame({{ controller: "none", rear_deg: null, superposition_deg: null }}); see();""",
+    )
+    assert page["result"] == [
+        ["100 %", None, None],
+        ["100 %", "1.3°", None],
+        ["100 %", "0.0°", None],  # straight ahead, still a controller with rear steering
+        ["100 %", None, None],
+    ]
+
+
 def asked(tmp_path: Path, events: str) -> list[Any]:
     """Return the values of the slider that are sent, each with whether it was dragged."""
     return script(
