@@ -169,8 +169,7 @@ class DriveSession:
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
-        # Cones alone do not say where to go.
-        line = [] if course is None or lanes else np.column_stack([course.path.x_m, course.path.y_m])[::_LINE_EVERY]
+        line = [] if course is None else np.column_stack([course.path.x_m, course.path.y_m])[::_LINE_EVERY]
         yield Reply(
             {
                 "kind": "drive", "shape": header, "cones": self._cones().tolist(), "lanes": lanes,

@@ -9,6 +9,29 @@ const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for f
 const short = matchMedia("(max-height: 450px)");
 const PLAIN = ["speed", "sideslip", "grip used", "rear steer", "time", "cones"]; // gauges that a phone shows
 
+const OFF_M = 8; // distance from the line of a course at which a car has left it
+
+// Return where a car that has left its course finds it again: the next cone, the start behind the last one, or the circle.
+export function wayBack({ cones, line, radius_m }, x, y) {
+  if (radius_m) {
+    const out = Math.hypot(x, y - radius_m), share = radius_m / Math.max(out, 1e-3);
+    return Math.abs(out - radius_m) > OFF_M ? { x: x * share, y: radius_m + (y - radius_m) * share } : null;
+  }
+  if (!line.length || line.some((point) => Math.hypot(point[0] - x, point[1] - y) <= OFF_M)) return null;
+  const next = nextOf(cones, x) ?? line[0];
+  return { x: next[0], y: next[1] };
+}
+
+const nextOf = (cones, x) => cones.filter((cone) => cone[0] > x).reduce((a, b) => (a && a[0] <= b[0] ? a : b), null);
+
+// Return the next cone that stands alone, with the side on which the line passes it: 1 left, -1 right.
+export function nextSide({ cones, lanes, line }, x) {
+  const next = lanes.length ? null : nextOf(cones.filter((cone) => !cones.some((other) => other !== cone && Math.abs(other[0] - cone[0]) < 0.5)), x);
+  if (!next) return null;
+  const beside = line.reduce((a, b) => (Math.abs(a[0] - next[0]) <= Math.abs(b[0] - next[0]) ? a : b));
+  return { x: next[0], y: next[1], side: Math.sign(beside[1] - next[1]) };
+}
+
 export class Drive {
   constructor(socket, say) {
     this.socket = socket;
@@ -145,6 +168,7 @@ export class Drive {
   begin(header, arrays) {
     if (header.id !== this.asked) return;
     this.ready = true;
+    this.course = header;
     // Only drives of the same course with the same car, control, speed and friction can be compared.
     this.setting = String(this.address);
     this.timed = header.cones.length > 0 || header.radius_m > 0;
@@ -246,6 +270,8 @@ export class Drive {
     scene.follow(["you"], dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [0, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
     this.gauges(header);
+    scene.mark(nextSide(this.course, poses[0]));
+    this.showWay(header.last_lap_s != null && !this.rounds ? null : wayBack(this.course, poses[0], poses[1]), poses);
     if (!this.running) return;
     scene.grow("you");
     this.frames.push({ time_s, poses });
@@ -255,6 +281,15 @@ export class Drive {
     for (const cone of header.cones) { this.struck += 1; scene.knock(cone, header.yaw_rate_degps < 0 ? -1.2 : 1.2); }
     if (header.hold_kmh != null && !this.held) { $("drive-speed").value = header.hold_kmh; this.values(header.hold_kmh); }
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
+  }
+
+  // An arrow that points back to the course, as seen in the picture.
+  showWay(way, [x, y]) {
+    $("way").hidden = !way;
+    if (!way) return;
+    const ahead = way.x - x, left = way.y - y;
+    $("way").firstElementChild.setAttribute("style", `transform: rotate(${((this.scene.heading ?? 0) - Math.atan2(left, ahead)) * 180 / Math.PI}deg)`);
+    $("way").lastElementChild.textContent = `course ${number(Math.hypot(ahead, left), 0)} m`;
   }
 
   // Return where the last drive was at this time.

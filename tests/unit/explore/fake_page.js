@@ -30,7 +30,7 @@ export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
 export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} knock() {} lighten() {} draw() {} follow() {} }
+export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} mark() {} knock() {} lighten() {} draw() {} follow() {} }
 export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };

@@ -150,7 +150,7 @@ def test_each_cone_that_is_hit_adds_two_seconds_to_the_time(tmp_path: Path) -> N
     car.end()
 
 
-def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
+def test_a_course_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
     slalom, lane_change = drive("slalom", tmp_path), drive("lane_change", tmp_path)
     start, other = (next(car.start()).header for car in (slalom, lane_change))
     slalom.end()
@@ -164,7 +164,10 @@ def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path
     beside_m = np.interp(cones[:, 0], x_m, y_m) - cones[:, 1]
     assert np.abs(beside_m).min() > 0.9
     assert (np.sign(beside_m[1:]) == -np.sign(beside_m[:-1])).sum() >= len(cones) // 2
-    assert other["line"] == []  # it has lanes
+    ends_m = {lane["start_x_m"]: lane for lane in other["lanes"]}
+    x_m, y_m = np.array(other["line"]).T
+    for start_m, lane in ends_m.items():  # through all its lanes
+        assert lane["right_y_m"] < np.interp(start_m, x_m, y_m) < lane["left_y_m"]
 
 
 def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:

@@ -59,10 +59,10 @@ def driven(tmp_path: Path, events: str) -> Any:
     return script(
         tmp_path,
         f"""import {{ $ }} from "./fake.mjs";
-        import {{ Drive }} from "./drive.mjs";
+        import {{ Drive, nextSide, wayBack }} from "./drive.mjs";
         const sent = [], drive = new Drive({{ send: (message) => sent.push(message) }}, () => {{}});
         const key = (name, down = true) => $("window").fire(down ? "keydown" : "keyup", {{ key: name }});
-        const ready = () => drive.begin({{ id: drive.asked, cones: [], radius_m: 0 }}, []);
+        const ready = () => drive.begin({{ id: drive.asked, cones: [], lanes: [], line: [], radius_m: 0 }}, []);
         const frame = (more) => drive.frame({{ time_s: 1, speed_kmh: 60, sideslip_deg: 0, friction_use: 1.02,
           ay_mps2: 0, yaw_rate_degps: 0, steering_wheel_deg: 0, cones: [], controller: "none", hold_kmh: 55,
           penalty_s: 0, ...more }}, [[0, 0, 0]]);
@@ -138,6 +138,28 @@ def test_gauges_show_at_most_all_grip_and_only_angles_that_the_controller_adds(t
         ["100 %", "0.0°", None],  # straight ahead, still a controller with rear steering
         ["100 %", None, None],
     ]
+
+
+def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """const plane = { radius_m: 0, lanes: [], cones: [], line: [] }, pad = { ...plane, radius_m: 40 };
+        const course = { ...plane, cones: [[80, 0], [50, 0]], line: [[0, 0], [50, 2], [80, -2], [90, 0]] };
+        globalThis.seen = [wayBack(course, 49, 3), wayBack(course, 40, 30), wayBack(course, 60, 30),
+          wayBack(course, 200, 0), wayBack(pad, 100, 40), wayBack(pad, 0, 1), wayBack(plane, 900, 900)];""",
+    )
+    next_one, second, start, circle = {"x": 50, "y": 0}, {"x": 80, "y": 0}, {"x": 0, "y": 0}, {"x": 40, "y": 40}
+    assert page["result"] == [None, next_one, second, start, circle, None, None]
+
+
+def test_the_next_cone_of_a_slalom_has_the_side_on_which_the_line_passes_it(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """const line = [[0, 0], [50, 2], [80, -2], [110, 0]];
+        const course = { lanes: [], cones: [[50, 0], [80, 0], [110, -2], [110, 2]], line };
+        globalThis.seen = [0, 55, 90].map((x) => nextSide(course, x)?.side ?? null);""",
+    )
+    assert page["result"] == [1, -1, None]  # a pair of cones is a gate
 
 
 def asked(tmp_path: Path, events: str) -> list[Any]:
