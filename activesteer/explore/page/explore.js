@@ -16,7 +16,7 @@ export function say(text, hint = false) {
   $("alert").hidden = !text;
 }
 
-const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
+const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); }, (is) => { $("whole").hidden = !is; });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
@@ -139,7 +139,7 @@ const hear = {
     scene.setShape(header.shape, arrays);
     // A driver follows a path; an own one may do more.
     $("driver").disabled = header.steered && ![...$("driver").options].some(({ value }) => value.includes("."));
-    $("driver").title = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself." : "";
+    $("steered").textContent = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself, so there is no driver to choose." : "";
     if ($("driver").disabled) $("driver").value = FIRST.driver;
     asking.ask(false);
   },
@@ -267,7 +267,7 @@ function showSliders() {
     return box;
   }));
   const before = $("group").value;
-  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
+  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, `Sliders: ${group}`)));
   if (groups.includes(before)) $("group").value = before;
   if (small.matches) showGroup();
 }
@@ -367,8 +367,14 @@ for (const id of NAMED) $(id).addEventListener("change", () => {
   describe();
 });
 $("group").addEventListener("change", showGroup);
+$("fold").addEventListener("click", () => {
+  const folded = $("tuning").classList.toggle("folded");
+  $("fold").textContent = folded ? "Show sliders" : "Hide sliders";
+  $("fold").setAttribute("aria-expanded", String(!folded));
+});
 $("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
+$("whole").addEventListener("click", () => curves.whole());
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
 $("save").addEventListener("click", () => { $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));

@@ -1,6 +1,6 @@
 // Just enough of a page to run explore.js without a browser; `sent` has the messages to the program.
 class FakeElement {
-  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle() {} }; }
+  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle: () => (this.toggled = !this.toggled) }; }
   setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
   append(...children) { this.words = [this.words ?? "", ...children.filter((child) => typeof child === "string")].join(""); this.children.push(...children.filter((child) => child instanceof FakeElement)); }
   replaceChildren(...children) { this.children = children; }
