@@ -49,6 +49,7 @@ class DrivingCourse(NamedTuple):
     speed_kmh: float  # speed at the start [km/h]
     radius_m: float = 0.0  # radius of a circle to the left that begins at the start [m]; 0 for none
     mu: float = 0.9  # friction of the road [-]
+    vehicle: str = ""  # car that shows best what there is to see; empty for any
 
 
 COURSES: Final = {
@@ -74,7 +75,12 @@ COURSES: Final = {
     ),
     "plane": DrivingCourse("Free plane, dry", "Drive where you like, and switch the control.", _PLANE, 60.0, mu=1.0),
     "slippery": DrivingCourse(
-        "Free plane, packed snow", "Make the car slide, and switch the control.", _PLANE, 40.0, mu=0.3
+        "Free plane, packed snow",
+        "Hold left for 1 s, then right. Without control (none) the BMW spins; with lqr or esc it does not.",
+        _PLANE,
+        70.0,
+        mu=0.3,
+        vehicle="bmw_m8",
     ),
 }
 """Name -> place to drive."""

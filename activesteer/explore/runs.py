@@ -22,7 +22,7 @@ from activesteer.analysis.report.groups import groups_of
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, run_looks
-from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed, height_colours
@@ -227,6 +227,7 @@ class Runs:
         self.folder = folder
         self._held_rad: dict[tuple[str, str], float] = {}
         self._kept: dict[str, tuple[str, Recording]] = {}  # name -> label and recording of its last run
+        self._files: list[Path] = []  # recordings that hold these runs
         self._limits_of: tuple[Any, dict[str, tuple[float, float]]] = None, {}
 
     def describe(self, choice: Describe) -> Reply:
@@ -248,7 +249,7 @@ class Runs:
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply for each as soon as it is driven."""
-        self._kept = {}  # what fails from here on leaves nothing to save
+        self._kept, self._files = {}, []  # what fails from here on leaves nothing to save
         self.folder.check(choice)
         check_numbers(choice.values, self._limits(choice))
         scenario, overrides, held, note = self._held(choice, choice.values)
@@ -280,13 +281,17 @@ class Runs:
         yield Reply({"kind": "finished", **self._commands(choice, overrides, list(self._kept))})
 
     def save(self) -> Reply:
-        """Write the last runs as recordings."""
+        """Write the last runs as recordings, unless they are saved already."""
+        folder = str(self.folder.path)
+        if self._files and all(file.exists() for file in self._files):
+            return Reply({"kind": "saved", "files": [], "exist": [file.name for file in self._files], "folder": folder})
         paths = []
         for label, recording in self._runs().values():
             path = free_path(self.folder.path, f"{recording.metadata['maneuver']['name']}-{label}", ".mcap")
             recording.save(path)
             paths.append(path)
-        return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
+        self._files = paths
+        return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": folder})
 
     def driven(self) -> dict[str, Recording]:
         """Return the recordings of the last runs by the names of their files in a report."""
@@ -450,5 +455,7 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             digits = 0 if metric.whole else 3 if fine else None
             known = size if math.isfinite(size) and not is_lost else None
             figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
+            if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
+                figure |= {"title": "Room to the edge of the lane", "value": None if known is None else -known}
             found.append(figure)
     return found

@@ -87,13 +87,22 @@ export class Drive {
     this.choose({});
   }
 
-  // Choose what the address names: #drive=lane_change&vehicle=sedan&controller=ars&speed_kmh=60&mu=0.5
-  choose({ drive, vehicle = "compact", controller = "none", speed_kmh, mu }) {
+  // Choose what the address names, and return what is wrong with it: #drive=lane_change&vehicle=sedan&controller=ars&speed_kmh=60&mu=0.5
+  choose({ drive, vehicle, controller = "none", speed_kmh, mu, ...unknown }) {
     if (courses[drive]) $("course").value = drive;
     this.ofCourse();
-    for (const [id, name] of [["drive-vehicle", vehicle], ["drive-controller", controller]]) offer($(id), name);
-    const inside = (id, value) => (Number.isFinite(+value) ? Math.min(+$(id).max, Math.max(+$(id).min, +value)) : +$(id).value);
-    this.startAt(inside("drive-speed", speed_kmh), inside("drive-mu", mu));
+    for (const [id, name] of [["drive-vehicle", vehicle ?? (courses[$("course").value].vehicle || "compact")], ["drive-controller", controller]]) offer($(id), name);
+    const told = Object.keys(unknown).map((key) => `The address has an unknown key: ${key}.`);
+    if (drive && !courses[drive]) told.unshift(`There is no course ${drive}; there are ${Object.keys(courses).join(", ")}.`);
+    const inside = (id, key, text) => {
+      const { min, max, value } = $(id);
+      if (text == null) return +value;
+      if (text === "" || !Number.isFinite(+text)) { told.push(`${key}=${text} is not a number, so ${value} is driven.`); return +value; }
+      if (+text < +min || +text > +max) told.push(`${key}=${text} is outside ${min} to ${max}. The nearest value is driven.`);
+      return Math.min(+max, Math.max(+min, +text));
+    };
+    this.startAt(inside("drive-speed", "speed_kmh", speed_kmh), inside("drive-mu", "mu", mu));
+    return told.join(" ");
   }
 
   // On a small screen, the choices fold away while the car drives; a short one has no room for them before.
@@ -115,9 +124,10 @@ export class Drive {
     return new URLSearchParams({ drive: $("course").value, vehicle: $("drive-vehicle").value, controller: $("drive-controller").value, speed_kmh: this.start_kmh, mu: this.start_mu });
   }
 
-  // Speed and friction of the course, until they are moved.
+  // Speed and friction of the course, until they are moved, and its car, if it has one.
   ofCourse() {
     const course = courses[$("course").value];
+    if (course.vehicle) offer($("drive-vehicle"), course.vehicle);
     for (const goal of document.querySelectorAll(".goal")) goal.textContent = course.goal;
     this.startAt(course.speed_kmh, course.mu);
   }

@@ -11,10 +11,14 @@ const TOLD_MS = 100; // time between two readings of the curves while they play
 const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
 export function say(text, hint = false) {
+  state.hinted = hint && !!text;
   $("message").textContent = text;
   $("alert").classList.toggle("hint", hint);
   $("alert").hidden = !text;
 }
+
+// A hint is gone with the next thing that the reader does.
+function unhint() { if (state.hinted) say(""); }
 
 const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); }, (is) => { $("whole").hidden = !is; });
 const track = new Track($("track"));
@@ -53,12 +57,17 @@ function readAddress() {
   const wanted = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   const explore = wanted.drive == null ? wanted : {};
   for (const id of NAMED) offer($(id), explore[id] ?? FIRST[id]);
-  const names = explore.controllers?.split(",") ?? FIRST.controllers;
+  const names = explore.controllers?.split(",").filter(Boolean) ?? FIRST.controllers;
   for (const name of names) if (!boxes().some((box) => box.value === name)) addBox(name);
   for (const box of boxes()) box.checked = names.includes(box.value);
   state.wanted = explore;
+  state.addressed = wanted.drive == null;
   describe();
-  if (wanted.drive != null) { drive.choose(wanted); show("drive"); } else if (drive.shown) show("explore");
+  if (wanted.drive != null) {
+    const told = drive.choose(wanted);
+    show("drive");
+    say(told, true);
+  } else if (drive.shown) show("explore");
 }
 
 function writeAddress() {
@@ -128,12 +137,18 @@ const hear = {
     showTitle(header.title);
     $("note").textContent = "";
     state.sliders = header.sliders;
-    const limited = [];
+    const told = [];
     for (const { key, label, unit, low, high } of header.sliders) if (key in state.wanted) {
-      state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
-      if (state.values[key] !== +state.wanted[key]) limited.push(`${label} ${state.wanted[key]} is outside ${low} to ${high} ${unit}`.trim());
+      const text = state.wanted[key], value = text === "" ? NaN : +text;
+      if (!Number.isFinite(value)) { told.push(`${key}=${text} is not a number, so the value of the file is driven.`); continue; }
+      state.values[key] = Math.min(high, Math.max(low, value));
+      if (state.values[key] !== value) told.push(`${label} ${text} is outside ${low} to ${`${high} ${unit}`.trim()}. The nearest value is driven.`);
     }
-    if (limited.length) say(`${limited.join("; ")}. The nearest value is driven.`, true);
+    // A slider may be missing for another controller; a key of an address must mean something.
+    const unknown = state.addressed ? Object.keys(state.wanted).filter((key) => ![...NAMED, "controllers"].includes(key) && !header.sliders.some((slider) => slider.key === key)) : [];
+    if (unknown.length) told.push(`The address has ${unknown.length > 1 ? "keys" : "a key"} without a slider here: ${unknown.join(", ")}.`);
+    state.addressed = false;
+    if (told.length) say(told.join(" "), true);
     state.wanted = {};
     showSliders();
     scene.setShape(header.shape, arrays);
@@ -168,7 +183,7 @@ const hear = {
     asking.finished();
   },
 
-  saved(header) { $("saved").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
+  saved(header) { $("saved").textContent = header.files.length ? `saved ${header.files.join(", ")} in ${header.folder}` : `these runs are already saved: ${header.exist.join(", ")} in ${header.folder}`; },
   report() { window.open("report", "_blank"); },
   error(header) {
     if (["run", "describe"].includes(header.about) && header.id !== state.id) return; // of an older choice
@@ -290,6 +305,7 @@ function sliderOf(slider) {
   const [factor, unit] = BIGGER[slider.unit] ?? [1, slider.unit], digits = Math.max(0, -Math.floor(Math.log10(slider.step * factor)));
   const write = () => { shown.textContent = `${number(+input.value * factor, digits)} ${unit}`; box.classList.toggle("changed", slider.key in state.values); };
   const moved = (dragging) => {
+    unhint();
     const value = Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step));
     if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
     else state.values[slider.key] = +value.toPrecision(9);
@@ -369,14 +385,14 @@ for (const id of NAMED) $(id).addEventListener("change", () => {
 $("group").addEventListener("change", showGroup);
 $("fold").addEventListener("click", () => {
   const folded = $("tuning").classList.toggle("folded");
-  $("fold").textContent = folded ? "Show sliders" : "Hide sliders";
+  $("fold").textContent = folded ? "Show sliders" : "Hide";
   $("fold").setAttribute("aria-expanded", String(!folded));
 });
-$("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
+$("reset").addEventListener("click", () => { unhint(); state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
 $("whole").addEventListener("click", () => curves.whole());
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
-$("save").addEventListener("click", () => { $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
+$("save").addEventListener("click", () => { unhint(); $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
 for (const what of ["command", "python"]) {
   $(`copy-${what}`).addEventListener("click", async ({ target }) => {

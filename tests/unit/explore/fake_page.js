@@ -52,13 +52,13 @@ export function start() {
   finish();
 }
 export function describe() {
-  const { id } = sent.at(-1);
+  const { id } = sent.at(-1) ?? {};
   const slider = { key: "speed_kmh", label: "speed", unit: "km/h", group: "manoeuvre", low: 20, high: 160, step: 1, value: 80 };
   hear({ kind: "description", id, title: "Step steer, 80 km/h", sliders: [slider], shape: {} }, [[]]);
 }
 export function finish(title = "Step steer, 80 km/h") {
-  const { id } = sent.at(-1);
-  hear({ kind: "run", id, name: "none", title, error: "no curve in this test" }, [undefined]);
+  const { id } = sent.at(-1) ?? {};
+  hear({ kind: "run", id, name: "none", title, figures: [], losses: [] }, [undefined]);
   hear({ kind: "finished", id, command: "", python: "" }, []);
 }
 export const slider = () => $("sliders").querySelectorAll("input")[0];

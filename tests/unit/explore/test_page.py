@@ -273,6 +273,50 @@ def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> Non
     assert "speed_kmh=95" in page["address"]
 
 
+@pytest.mark.parametrize(("address", "value", "words"), [
+    ("speed_kmh=abc", None, "speed_kmh=abc is not a number"),
+    ("speed_kmh=999", 160, "speed 999 is outside 20 to 160 km/h"),
+    ("speed_kmh=90&sped=3", 90, "a key without a slider here: sped"),
+    ("speed_kmh=90", 90, ""),
+])  # fmt: skip
+def test_what_is_wrong_in_an_address_is_told(address: str, value: float | None, words: str, tmp_path: Path) -> None:
+    page = used(tmp_path, "", f"#maneuver=step_steer&controllers=none&{address}")
+    assert page["before"][-1]["values"] == ({} if value is None else {"speed_kmh": value})
+    assert (words in page["message"]) if words else page["message"] == ""
+
+
+def test_an_address_without_a_controller_asks_for_one(tmp_path: Path) -> None:
+    page = used(tmp_path, "", "#maneuver=step_steer&controllers=")
+    assert page["before"] == []
+    assert page["message"] == "Choose at least one controller."
+
+
+def test_the_address_of_a_drive_is_checked(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """$("drive-speed").min = 20;
+        globalThis.seen = [{ drive: "slalom", speed_kmh: "abc" }, { drive: "slalm" }, { drive: "slalom", sped: "3" },
+          { drive: "slalom", speed_kmh: "900" }, { drive: "slalom", speed_kmh: "50" }].map((one) => drive.choose(one));
+        seen.push(drive.start_kmh);""",
+    )
+    number, course, key, outside, right, speed_kmh = page["result"]
+    assert number.startswith("speed_kmh=abc is not a number")
+    assert "There is no course slalm" in course
+    assert "unknown key: sped" in key
+    assert "outside 20 to 200" in outside
+    assert right == ""
+    assert speed_kmh == 50
+
+
+def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
+    fifth = 'tick("lqr", true); describe(); tick("esc", true);'
+    assert used(tmp_path, fifth)["message"].startswith("esc is not driven")
+    for action in ("$('save').fire('click');", "drag(90);"):
+        assert used(tmp_path, fifth + action)["message"] == ""
+    error = "hear({ kind: 'error', text: 'no such file', about: null }, []);"
+    assert used(tmp_path, error + "$('save').fire('click');")["message"] == "no such file"  # an error stays
+
+
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     page = used(
         tmp_path,
@@ -289,5 +333,8 @@ def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
     reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"
+    again = "{ kind: 'saved', files: [], exist: ['a.mcap'], folder: '/f' }"
+    shown = used(tmp_path, f"$('save').fire('click'); hear({again}, []);")["saved"]
+    assert shown == "these runs are already saved: a.mcap in /f"
     refused = "{ kind: 'error', text: 'there is no run', about: 'save' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({refused}, []);")["saved"] == "there is no run"

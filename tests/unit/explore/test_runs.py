@@ -148,6 +148,27 @@ def test_a_car_that_turns_round_has_its_sideslip_within_half_a_turn_and_no_figur
     assert figures["Peak sideslip"]["value"] is None
 
 
+def test_runs_are_saved_once_until_they_change_or_their_file_is_gone(tmp_path: Path) -> None:
+    runs, choice = Runs(Folder(tmp_path)), RunRequest(maneuver="step_steer", controllers=("none",))
+    list(runs.run(choice, lambda: False))
+    assert runs.save().header["files"] == ["step_steer-none.mcap"]
+    again = runs.save().header
+    assert (again["files"], again["exist"]) == ([], ["step_steer-none.mcap"])
+    (tmp_path / "step_steer-none.mcap").unlink()
+    assert runs.save().header["files"] == ["step_steer-none.mcap"]
+    list(runs.run(choice, lambda: False))
+    assert runs.save().header["files"] == ["step_steer-none_2.mcap"]
+
+
+def test_room_to_the_edge_of_the_lane_is_positive_inside(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    run, _ = runs.run(RunRequest(maneuver="double_lane_change", controllers=("ars",)), lambda: False)
+    room = next(figure for figure in run.header["figures"] if figure["title"] == "Room to the edge of the lane")
+    runs.save()
+    (path,) = tmp_path.glob("*.mcap")
+    assert room["value"] == pytest.approx(-activesteer.Recording.open(path).metrics["lane_overstep_m"])
+
+
 def test_less_friction_gives_a_smaller_slip_angle_of_the_largest_side_force() -> None:
     scenario = resolve("step_steer")
     dry, snow = slip_limit_deg(scenario, 0.9), slip_limit_deg(scenario, 0.3)
