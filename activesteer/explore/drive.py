@@ -49,6 +49,7 @@ class DrivingCourse(NamedTuple):
     speed_kmh: float  # speed at the start [km/h]
     radius_m: float = 0.0  # radius of a circle to the left that begins at the start [m]; 0 for none
     mu: float = 0.9  # friction of the road [-]
+    vehicle: str = ""  # car that shows best what there is to see; empty for any
 
 
 COURSES: Final = {
@@ -74,7 +75,12 @@ COURSES: Final = {
     ),
     "plane": DrivingCourse("Free plane, dry", "Drive where you like, and switch the control.", _PLANE, 60.0, mu=1.0),
     "slippery": DrivingCourse(
-        "Free plane, packed snow", "Make the car slide, and switch the control.", _PLANE, 40.0, mu=0.3
+        "Free plane, packed snow",
+        "Hold left for 1 s, then right. Without control (none) the BMW spins; with lqr or esc it does not.",
+        _PLANE,
+        70.0,
+        mu=0.3,
+        vehicle="bmw_m8",
     ),
 }
 """Name -> place to drive."""
@@ -171,8 +177,7 @@ class DriveSession:
         course = self._simulation.scenario.maneuver.course
         header, arrays = shape_of(self._simulation.loop.vehicle)
         lanes = [] if course is None else [lane._asdict() for lane in course.lanes]
-        # Cones alone do not say where to go.
-        line = [] if course is None or lanes else np.column_stack([course.path.x_m, course.path.y_m])[::_LINE_EVERY]
+        line = [] if course is None else np.column_stack([course.path.x_m, course.path.y_m])[::_LINE_EVERY]
         yield Reply(
             {
                 "kind": "drive", "shape": header, "cones": self._cones().tolist(), "lanes": lanes,
@@ -234,8 +239,10 @@ class DriveSession:
             "steering_wheel_deg": math.degrees(loop.measurement.steering_wheel_rad),
             "sideslip_deg": sideslip_deg,
             "yaw_rate_degps": math.degrees(motion.yaw_rate_radps), "ay_mps2": truth["ay_mps2"],
-            "rear_deg": math.degrees(loop.measurement.rear_steer_rad),
-            "superposition_deg": math.degrees(loop.measurement.superposition_rad),
+            # None while the controller demands no such angle: what is left is the give of a hinge.
+            "rear_deg": math.degrees(loop.measurement.rear_steer_rad) if truth["rear_steer_demand_rad"] else None,
+            "superposition_deg": math.degrees(loop.measurement.superposition_rad)
+            if truth["superposition_demand_rad"] else None,
             "friction_use": max(truth[f"{corner}_friction_utilisation"] for corner in CORNERS),
             "sliding": [truth[f"{corner}_friction_utilisation"] > 0.98 for corner in CORNERS],
             "cones": fallen, "penalty_s": penalty_s,

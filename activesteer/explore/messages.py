@@ -73,7 +73,9 @@ class Save(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", ta
 
 
 class Report(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="report"):
-    """Request of the page for a report of the last runs."""
+    """Request of the page for a report of the last runs, or of the last drive."""
+
+    drive: bool = False  # whether the report is that of the last drive
 
 
 class End(Struct, frozen=True, forbid_unknown_fields=True, tag_field="kind", tag="end"):

@@ -15,20 +15,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from activesteer.analysis.harm import losses
+from activesteer.analysis.harm import LOST, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
-from activesteer.analysis.report.run_page import write_report
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
-from activesteer.core.conventions import CORNERS, run_looks
-from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, run_looks
+from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed, height_colours
-from activesteer.drawing.panels import EXPLORE
-from activesteer.errors import ActiveSteerError, ParameterError
+from activesteer.drawing.panels import EXPLORE, PANELS
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
 from activesteer.plugins import Declared, Plugin
@@ -40,6 +39,7 @@ from activesteer.road.road import road_of
 from activesteer.scenario import Scenario, resolve, value_of
 from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
+from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle import Vehicle
 
 _MANEUVER: Final = {
@@ -207,6 +207,7 @@ def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], 
     return drawn.plane_below_m, (corners_m.astype(np.float32), factors.astype(np.float32), triangles.astype(np.float32))
 
 
+_SIDESLIP: Final = PANELS["sideslip"].title
 _CHUNK: Final = 500
 """Steps between two looks for a newer choice; about 10 ms."""
 
@@ -226,8 +227,8 @@ class Runs:
         self.folder = folder
         self._held_rad: dict[tuple[str, str], float] = {}
         self._kept: dict[str, tuple[str, Recording]] = {}  # name -> label and recording of its last run
+        self._files: list[Path] = []  # recordings that hold these runs
         self._limits_of: tuple[Any, dict[str, tuple[float, float]]] = None, {}
-        self._choice: tuple[Choice, dict[str, float]] | None = None
 
     def describe(self, choice: Describe) -> Reply:
         """Return the sliders and the car of a choice."""
@@ -248,19 +249,18 @@ class Runs:
 
     def run(self, choice: RunRequest, stale: Callable[[], bool]) -> Iterator[Reply]:
         """Drive the chosen controllers, and yield a reply when each run ends."""
-        self._kept, self._choice = {}, None  # what fails from here on leaves nothing to save
+        self._kept, self._files = {}, []  # what fails from here on leaves nothing to save
         self.folder.check(choice)
-        overrides = choice.values
-        check_numbers(overrides, self._limits(choice))
-        scenario, held = self._held(choice, self._resolved(choice, overrides))
+        check_numbers(choice.values, self._limits(choice))
+        scenario, overrides, held, note = self._held(choice, choice.values)
         looks = run_looks(choice.controllers)
-        self._choice = choice, overrides
         road = scenario.maneuver.road
         mu = None if is_overruled(road, "mu") else road.mu
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
-            run["title"] = (scenario.maneuver.title or choice.maneuver) + held
+            run["slip_limit_deg"] = None if mu is None else slip_limit_deg(scenario, mu)
+            run |= {"title": (scenario.maneuver.title or choice.maneuver) + held, "note": note}
             try:
                 controller = controller_spec(self.folder.located(name))
                 recording = self._driven(scenario, controller, stale)
@@ -271,28 +271,31 @@ class Runs:
                 return
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
-            shown = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
+            drawn = _within_half_turn(plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE))
             run["losses"] = list(losses(recording.metrics))
             surface: tuple[NDArray[np.float32], ...] = ()
             if len(self._kept) == 1 and not choice.dragging:  # all runs have the same road
                 run["ground_m"], surface = surface_of(recording)
-            shown_run = {**run, "plots": shown, "figures": _figures(recording), "pose_step_s": step_s}
+            shown_run = {**run, "plots": drawn, "figures": _figures(recording), "pose_step_s": step_s}
             yield Reply(shown_run, (poses, *surface))
         yield Reply({"kind": "finished", **self._commands(choice, overrides, list(self._kept))})
 
     def save(self) -> Reply:
-        """Write the last runs as recordings."""
+        """Write the last runs as recordings, unless they are saved already."""
+        folder = str(self.folder.path)
+        if self._files and all(file.exists() for file in self._files):
+            return Reply({"kind": "saved", "files": [], "exist": [file.name for file in self._files], "folder": folder})
         paths = []
         for label, recording in self._runs().values():
             path = free_path(self.folder.path, f"{recording.metadata['maneuver']['name']}-{label}", ".mcap")
             recording.save(path)
             paths.append(path)
-        return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": str(self.folder.path)})
+        self._files = paths
+        return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": folder})
 
-    def report(self, path: Path) -> Reply:
-        """Write a report of the last runs."""
-        write_report({f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}, path)
-        return Reply({"kind": "report"})
+    def driven(self) -> dict[str, Recording]:
+        """Return the recordings of the last runs by the names of their files in a report."""
+        return {f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}
 
     def _runs(self) -> dict[str, tuple[str, Recording]]:
         if not self._kept:
@@ -318,17 +321,32 @@ class Runs:
             self._limits_of = names, {slider.key: (slider.low, slider.high) for slider in self._sliders(choice)}
         return self._limits_of[1]
 
-    def _held(self, choice: RunRequest, scenario: Scenario) -> tuple[Scenario, str]:
-        """Return a scenario with its amplitude, and a description of the amplitude for the title.
+    def _held(self, choice: RunRequest, overrides: dict[str, float]) -> tuple[Scenario, dict[str, float], str, str]:
+        """Return a scenario with its amplitude, its overrides, words for its title, and a note for the reader.
 
-        While a slider moves, the amplitude is that of the last search, else a new one.
+        While a slider moves, the amplitude is that of the last search, else a new one. If a new search fails, the
+        amplitude stays, and becomes an override.
         """
-        key = choice.maneuver, choice.vehicle
-        held = choice.dragging and key in self._held_rad
-        if not held and (angle_rad := searched_angle(scenario)) is not None:
-            self._held_rad[key] = angle_rad
-        found = with_amplitude_found(scenario, angle_rad=self._held_rad.get(key))
-        return found, " (amplitude as before, until you let go)" if held else ""
+        scenario, key = self._resolved(choice, overrides), (choice.maneuver, choice.vehicle)
+        if choice.dragging and key in self._held_rad:
+            found = with_amplitude_found(scenario, angle_rad=self._held_rad[key])
+            return found, overrides, " (amplitude as before, until you let go)", ""
+        try:
+            if (angle_rad := searched_angle(scenario)) is not None:
+                self._held_rad[key] = angle_rad
+            return with_amplitude_found(scenario, angle_rad=angle_rad), overrides, "", ""
+        except ManeuverError:
+            search = scenario.maneuver.search
+            if search is None:
+                raise
+            if key not in self._held_rad and (angle_rad := searched_angle(self._resolved(choice, {}))) is not None:
+                self._held_rad[key] = angle_rad
+        fixed, angle_deg = _fixed_amplitude(with_amplitude_found(scenario, angle_rad=self._held_rad[key]), overrides)
+        note = (
+            f"On this road, the car does not reach {search.lateral_acceleration_mps2 / GRAVITY_MPS2:.2g} g without "
+            f"control. Therefore, the steering wheel angle stays at {angle_deg:.0f} deg."
+        )
+        return with_amplitude_found(self._resolved(choice, fixed)), fixed, "", note
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
         """Return the recording of a run, or None if a newer choice has arrived."""
@@ -361,6 +379,24 @@ class Runs:
         return {"command": shlex.join(words), "python": python}
 
 
+_SEARCHED: Final = {"steer": "steering_wheel", "turn": "steering_wheel", "": "reference_angle"}
+"""Table of a manoeuvre, or none -> key of the steering wheel angle that a search finds, without its unit."""
+
+
+def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """Return overrides that give the amplitude of a scenario without a search, and the amplitude [deg]."""
+    maneuver: Any = scenario.maneuver
+    for table, name in _SEARCHED.items():
+        owner = getattr(maneuver, table, None) if table else maneuver
+        angle_rad = getattr(owner, f"{name}_rad", None)
+        if angle_rad is not None:
+            angle_deg = float(f"{math.degrees(angle_rad):g}")  # as the command repeats it
+            useless = {f"{table}.{key}" for key in getattr(owner, "OVERRULED", {})}
+            kept = {key: value for key, value in overrides.items() if key not in useless}
+            return {**kept, f"{table}.{name}_deg".lstrip("."): angle_deg}, angle_deg
+    raise ManeuverError(f"{maneuver.name}: the amplitude of this manoeuvre has no key")
+
+
 def free_path(folder: Path, stem: str, suffix: str) -> Path:
     """Return a path in a folder that does not exist yet, numbered if necessary."""
     path, number = folder / f"{stem}{suffix}", 1
@@ -375,6 +411,36 @@ def _plain(name: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in name)[:100]
 
 
+_LARGEST_SLIP_DEG: Final = 20.0
+"""Largest slip angle that is looked at [deg]: beyond 15 to 20 deg, no tyre file has measured values."""
+_CLEAR_DROP: Final = 0.01
+"""Share by which the side force must fall behind its largest value. A flat curve has no slip angle to warn of."""
+_SPEED_MPS: Final = 20.0
+
+
+def slip_limit_deg(scenario: Scenario, mu: float) -> float | None:
+    """Return the slip angle of the largest side force of a rear tyre under its static load [deg], None if flat."""
+    tyre, load_N = scenario.car.tyres[1], scenario.car.config.single_track.wheel_loads_N[1]
+    angles_deg = np.arange(0.5, _LARGEST_SLIP_DEG, 0.1)
+    friction = mu / tyre.conventions.reference_friction
+    forces = MagicFormula(tyre).evaluate(load_N, 0.0, np.radians(angles_deg), vx_mps=_SPEED_MPS, road_friction=friction)
+    force_N = np.abs(forces.fy_N)
+    largest = int(np.argmax(force_N))
+    clear = force_N[-1] < (1.0 - _CLEAR_DROP) * force_N[largest]
+    return round(float(angles_deg[largest]), 1) if clear else None
+
+
+def _within_half_turn(drawn: dict[str, Any]) -> dict[str, Any]:
+    """Return plots whose sideslip angles are within 180 deg, with a gap where the angle changes its sign there."""
+    for series in (one for panel in drawn["panels"] if panel["title"] == _SIDESLIP for one in panel["series"]):
+        unwrapped = np.array(series["values"], float)  # None is nan
+        if np.nanmax(np.abs(unwrapped), initial=0.0) > 180.0:
+            turns = np.round(unwrapped / 360.0)
+            wrapped = np.where(np.diff(turns, prepend=turns[:1]) == 0.0, unwrapped - 360.0 * turns, np.nan)
+            series["values"] = [None if math.isnan(value) else round(value, 2) for value in wrapped.tolist()]
+    return drawn
+
+
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
     found = []
@@ -383,9 +449,13 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
         if name is not None:
             metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
             size = abs(value) if metric.better is Better.SMALLER else value
-            shown = size if math.isfinite(size) else None
+            is_lost = shown(name, recording.metrics, "") == LOST
             # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
             fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
             digits = 0 if metric.whole else 3 if fine else None
-            found.append({"title": title, "unit": metric.unit_name, "value": shown, "digits": digits})
+            known = size if math.isfinite(size) and not is_lost else None
+            figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
+            if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
+                figure |= {"title": "Room to the edge of the lane", "value": None if known is None else -known}
+            found.append(figure)
     return found

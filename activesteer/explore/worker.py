@@ -14,11 +14,13 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from activesteer.errors import ActiveSteerError
+from activesteer.analysis.report.run_page import write_report
+from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.choice import Folder, titles
 from activesteer.explore.drive import DriveSession
 from activesteer.explore.messages import Act, Describe, End, Message, Report, RunRequest, Save, Start, add
 from activesteer.explore.runs import Reply, Runs
+from activesteer.recording import Recording
 
 
 def work(connection: Connection, folder: str) -> None:
@@ -35,6 +37,7 @@ class _Worker:
         self._waiting: deque[Message] = deque()
         self._runs = Runs(folder)
         self._drive: DriveSession | None = None
+        self._driven: Path | None = None  # recording of the last drive
         self._reports = Path(tempfile.mkdtemp(prefix="activesteer-"))
 
     def run(self) -> None:
@@ -58,6 +61,7 @@ class _Worker:
         """End a drive, or remove a car that waits."""
         drive, self._drive = self._drive, None
         if drive is not None and drive.path is not None:
+            self._driven = drive.path
             yield drive.end()
 
     def _answer(self, message: Message) -> None:
@@ -81,8 +85,8 @@ class _Worker:
                 yield self._runs.save()
             case Report():
                 path = self._reports / "report.html"
-                reply = self._runs.report(path)
-                yield Reply({**reply.header, "html": path.read_text("utf-8")})
+                write_report(self._driven_run() if message.drive else self._runs.driven(), path)
+                yield Reply({"kind": "report", "html": path.read_text("utf-8")})
             case Start():
                 yield from self._ended()
                 self._drive = DriveSession(message, self._folder)
@@ -100,14 +104,19 @@ class _Worker:
         try:
             self._send(drive.frame())
             if drive.done:
-                self._drive = None
-                self._send(drive.end())
+                for reply in self._ended():
+                    self._send(reply)
         except (EOFError, BrokenPipeError):
             raise
         except (Exception, SystemExit) as error:
-            self._drive = None
-            ended = drive.end()
+            (ended,) = self._ended()
             self._send(Reply({**ended.header, "error": _words(error)}))
+
+    def _driven_run(self) -> dict[str, Recording]:
+        """Return the recording of the last drive by the name of its file."""
+        if self._driven is None:
+            raise ParameterError("there is no drive yet; drive first")
+        return {self._driven.name: Recording.open(self._driven)}
 
     def _stale(self) -> bool:
         """Return True if a newer choice is waiting."""

@@ -160,6 +160,8 @@ def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
 
     The place is the last line in one of the user's files, else the last line that is not in a library.
     """
+    if isinstance(error, SyntaxError) and error.filename:  # its text names the file and the line
+        return _words(error)
     frames = traceback.extract_tb(error.__traceback__)
     own = [frame for frame in frames if Path(frame.filename).name in files]
     outside = [frame for frame in frames if not frame.filename.startswith(_LIBRARIES)]

@@ -185,6 +185,7 @@ _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
     ("steer", "steering_wheel_rad"): (r"[\d.]+ [Ag]\b", "{:.3g} deg", math.pi / 180.0),
     ("steer", "amplitude_factor"): (r"[\d.]+ A\b", "{:.3g} A", 1.0),
     ("steer", "lateral_acceleration_mps2"): (r"[\d.]+ g\b", "{:.3g} g", GRAVITY_MPS2),
+    ("turn", "steering_wheel_rad"): (r"[\d.]+ m/s²", "{:.3g} deg", math.pi / 180.0),
     ("turn", "lateral_acceleration_mps2"): (r"[\d.]+ m/s²", "{:.3g} m/s²", 1.0),
     ("cones", "spacing_m"): (r"[\d.]+ m\b", "{:.3g} m", 1.0),
     ("road", "mu"): (r"\b(dry|slippery)\b", "friction {:.3g}", 1.0),

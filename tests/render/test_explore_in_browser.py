@@ -80,15 +80,19 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
     page.keyboard.down("ArrowLeft")
     page.wait_for_timeout(2000)
     page.keyboard.up("ArrowLeft")
-    page.keyboard.press("r")  # restart: the drive is saved, and the car waits at the start again
-    page.wait_for_selector("#driven:has-text('Saved as')", timeout=LIMIT_MS)
-    page.click("#start:has-text('Drive at 60 km/h')", timeout=LIMIT_MS)
+    page.keyboard.press("r")  # restart: the drive is saved, and the car drives off at the start again
+    page.wait_for_selector("#again:hidden", state="attached", timeout=LIMIT_MS)
     page.wait_for_selector("#again:visible", timeout=LIMIT_MS)
+    assert not page.locator("#start").is_visible()
     said = "(header) => { activesteerDrive.gauges(header); return document.getElementById('again').textContent; }"
     for seen, words in (({"missed": True}, "Gate missed: restart"), ({"last_lap_s": 9.0}, "Finished: restart")):
         assert page.evaluate(said, {"steering_wheel_deg": 0.0, **seen}) == words
     page.keyboard.press("Escape")
     page.wait_for_selector("#driven:has-text('drive_plane_2.mcap')", timeout=LIMIT_MS)
+    with page.expect_popup() as popup:
+        page.click("#drive-report")
+    popup.value.wait_for_selector("h1", timeout=LIMIT_MS)
+    assert "driven by hand" in popup.value.inner_text("body")
     recording = activesteer.Recording.open(served[1] / "drive_plane.mcap")
     assert recording["y_m"][-1] > 1.0
     assert recording["yaw_rate_radps"].max() > 0.1
@@ -309,7 +313,9 @@ def test_an_address_names_files_of_the_folder(browser: Browser, served: tuple[st
 
 
 @pytest.mark.slow
-def test_an_address_names_a_drive_whose_start_a_restart_brings_back(browser: Browser, served: tuple[str, Path]) -> None:
+def test_an_address_names_a_drive_and_a_restart_keeps_the_friction_chosen_since(
+    browser: Browser, served: tuple[str, Path]
+) -> None:
     address = "#drive=plane&vehicle=sedan&controller=ars&speed_kmh=50&mu=0.5"
     page, problems = opened(browser, served[0] + address, viewport={"width": 1000, "height": 600})
     page.click("#start:has-text('Drive at 50 km/h')", timeout=LIMIT_MS)
@@ -318,12 +324,10 @@ def test_an_address_names_a_drive_whose_start_a_restart_brings_back(browser: Bro
     assert page.input_value("#drive-controller") == "ars"
     page.locator("#drive-mu").fill("0.8")  # during the drive
     page.keyboard.press("r")
-    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
-    assert page.input_value("#drive-mu") == "0.5"
+    page.wait_for_function("activesteerDrive.asked === 2 && activesteerDrive.running", timeout=LIMIT_MS)
+    assert page.input_value("#drive-mu") == "0.8"
     assert page.evaluate("activesteerDrive.ghosts.size") == 0  # a drive on another friction is nothing to beat
-    page.click("#start")
-    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
-    assert page.url.endswith(address)
+    assert page.url.endswith(address.replace("0.5", "0.8"))
     page.click("#tab-explore")
     page.wait_for_selector("#message:has-text('The drive has ended. It is saved as drive_plane')", timeout=LIMIT_MS)
     page.wait_for_selector(DONE, timeout=LIMIT_MS)

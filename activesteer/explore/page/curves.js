@@ -2,7 +2,7 @@
 import { element, number, onTheme, paint, runColour, slippery } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const HEIGHT = 170, CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
+const HEIGHT = 170, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
@@ -11,9 +11,11 @@ function padded(low, high, least) {
 }
 
 export class Curves {
-  constructor(box, pointed) {
+  // pointed: a time that the reader points at; zoomed: whether the curves show a part of the run.
+  constructor(box, pointed, zoomed) {
     this.box = box;
     this.pointed = pointed;
+    this.zoomed = zoomed;
     this.plots = new Map();
     new ResizeObserver(() => { for (const { plot, holder } of this.plots.values()) plot.setSize({ width: holder.clientWidth, height: HEIGHT }); }).observe(box);
     onTheme(() => this.draw());
@@ -51,6 +53,7 @@ export class Curves {
       }
       this.panel(title, panelOf, lines, data);
     }
+    this.tellSlip();
     this.again();
   }
 
@@ -71,6 +74,43 @@ export class Curves {
     this.marking = true;
     plot.setCursor({ left: plot.valToPos(time, "x"), top: 1 }, true, true);
     this.marking = false;
+  }
+
+  // Say when the rear axle of each run is beyond the slip angle of the largest side force, which is shaded.
+  tellSlip() {
+    const shown = this.plots.get(SLIP), limit = this.limit();
+    if (!shown) return;
+    const beyond = [...this.runs].filter(([, run]) => run.plots).flatMap(([name, run]) => {
+      const rear = run.plots.panels.find(({ title }) => title === SLIP)?.series.find(({ dotted }) => !dotted)?.values ?? [];
+      const at = firstBeyond(rear, limit);
+      return at < 0 ? [] : [`${name} from ${number(run.plots.start_s + at * run.plots.step_s, 2)} s`];
+    });
+    shown.told ??= shown.figure.appendChild(element("p", { class: "quiet told" }));
+    shown.told.textContent = limit == null ? "" : `Shaded, beyond ${number(limit, 1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${beyond.join(", ") || "no run"}.`;
+  }
+
+  limit() { return [...this.runs.values()].find((run) => run.plots)?.slip_limit_deg ?? null; }
+
+  // Shade the slip angles beyond that of the largest side force, and mark where each rear axle passes it.
+  shade(u) {
+    const limit = this.limit(), { ctx, bbox } = u;
+    if (limit == null) return;
+    const y = (value) => Math.min(Math.max(u.valToPos(value, "y", true), bbox.top), bbox.top + bbox.height);
+    ctx.save();
+    ctx.fillStyle = paint("failed");
+    ctx.globalAlpha = 0.12;
+    ctx.fillRect(bbox.left, bbox.top, bbox.width, y(limit) - bbox.top);
+    ctx.fillRect(bbox.left, y(-limit), bbox.width, bbox.top + bbox.height - y(-limit));
+    ctx.globalAlpha = 1;
+    for (const run of this.runs.values()) {
+      const rear = run.plots?.panels.find(({ title }) => title === SLIP)?.series.find(({ dotted }) => !dotted)?.values ?? [], at = firstBeyond(rear, limit);
+      if (at < 0) continue;
+      const x = u.valToPos(run.plots.start_s + at * run.plots.step_s, "x", true);
+      if (x < bbox.left || x > bbox.left + bbox.width) continue;
+      ctx.fillStyle = runColour(run.place);
+      ctx.beginPath(); ctx.arc(x, y(rear[at]), 4 * devicePixelRatio, 0, 7); ctx.fill();
+    }
+    ctx.restore();
   }
 
   // Borders of phases, and instants of a standard.
@@ -123,8 +163,8 @@ export class Curves {
       cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [{ ...axis(30, " s"), gap: 8 }, axis(44)],
-      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), auto: !line.ghost, width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
-      hooks: { drawAxes: [(u) => this.marks(u)], setCursor: [(u) => {
+      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
+      hooks: { drawAxes: [(u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
         const i = u.cursor.idx;
         const valueOf = (line, k) => element("span", { style: `border-bottom: 2px ${line.dotted ? "dotted" : "solid"} ${runColour(line.place)}` }, number(u.data[k + 1][i]));
         shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost ? [] : [valueOf(line, k), " "]))]));
@@ -149,6 +189,9 @@ export class Curves {
   // Show the whole run again.
   whole() { for (const { plot } of this.plots.values()) plot.setData(plot.data); }
 }
+
+// The first value beyond a limit, by its number, or -1.
+export function firstBeyond(values, limit) { return limit == null ? -1 : values.findIndex((value) => value != null && Math.abs(value) > limit); }
 
 // The times that a plot shows, or null if it shows all.
 function zoomOf({ data: [time], scales: { x: { min, max } } }) {
@@ -200,7 +243,7 @@ export class Track {
     [left, right, low, high] = [left - 6, right + 6, low - 3, high + 3];
     pen.font = FONT;
     const frictions = [...new Set([mu, ...course.patches.map((patch) => patch.mu)])].filter((one) => slippery(one)).slice(0, 3);
-    const words = [`from above, ${Math.round(right - left)} m`, course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, ...new Set(course.obstacles.map(({ text }) => text))].filter(Boolean);
+    const words = [`from above, ${Math.round(right - left)} m`, [...this.runs.values()].some((run) => run.plots?.track?.cones.some((cone) => cone[2])) && "red cross: hit cone", course.path && "dashed: path of the course", frictions.length && `blue: friction ${frictions.join(", ")}`, ...new Set(course.obstacles.map(({ text }) => text))].filter(Boolean);
     const inRows = (parts) => parts.reduce((rows, part) => (rows.length && pen.measureText(`${rows.at(-1)}; ${part}`).width <= width - 20 ? [...rows.slice(0, -1), `${rows.at(-1)}; ${part}`] : [...rows, part]), []);
     const foot = 15 * inRows([...words, "cars and widths are 1.0 times larger"]).length;
     // A car has its shape. Widths have the scale of the cars, so that their distances from cones and lanes are true.
@@ -228,8 +271,15 @@ export class Track {
       line(course.path.x, course.path.y);
       pen.setLineDash([]);
     }
-    pen.fillStyle = paint("cone");
-    for (const cone of course.cones) { pen.beginPath(); pen.arc(...place(cone[0], cone[1]), 2.4, 0, 7); pen.fill(); }
+    // A cone that any of the cars hits is crossed out.
+    course.cones.forEach(([x, y], i) => {
+      const [across, up] = place(x, y), hit = [...this.runs.values()].some((run) => run.plots?.track?.cones[i]?.[2]);
+      pen.fillStyle = pen.strokeStyle = paint(hit ? "failed" : "cone");
+      pen.beginPath(); pen.arc(across, up, 2.4, 0, 7); pen.fill();
+      if (!hit) return;
+      pen.lineWidth = 1.6;
+      for (const way of [-1, 1]) { pen.beginPath(); pen.moveTo(across - 5, up - 5 * way); pen.lineTo(across + 5, up + 5 * way); pen.stroke(); }
+    });
     for (const [runs, tail, thick] of [[this.ghosts, GHOST, 1.2], [this.runs, "", 2]]) {
       for (const run of runs.values()) for (const track of run.plots?.track?.tracks ?? []) {
         pen.strokeStyle = runColour(run.place) + tail;

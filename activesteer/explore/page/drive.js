@@ -9,6 +9,29 @@ const PAD_REACH = 0.4; // distance of the thumb from the middle of the pad for f
 const short = matchMedia("(max-height: 450px)");
 const PLAIN = ["speed", "sideslip", "grip used", "rear steer", "time", "cones"]; // gauges that a phone shows
 
+const OFF_M = 8; // distance from the line of a course at which a car has left it
+
+// Return where a car that has left its course finds it again: the next cone, the start behind the last one, or the circle.
+export function wayBack({ cones, line, radius_m }, x, y) {
+  if (radius_m) {
+    const out = Math.hypot(x, y - radius_m), share = radius_m / Math.max(out, 1e-3);
+    return Math.abs(out - radius_m) > OFF_M ? { x: x * share, y: radius_m + (y - radius_m) * share } : null;
+  }
+  if (!line.length || line.some((point) => Math.hypot(point[0] - x, point[1] - y) <= OFF_M)) return null;
+  const next = nextOf(cones, x) ?? line[0];
+  return { x: next[0], y: next[1] };
+}
+
+const nextOf = (cones, x) => cones.filter((cone) => cone[0] > x).reduce((a, b) => (a && a[0] <= b[0] ? a : b), null);
+
+// Return the next cone that stands alone, with the side on which the line passes it: 1 left, -1 right.
+export function nextSide({ cones, lanes, line }, x) {
+  const next = lanes.length ? null : nextOf(cones.filter((cone) => !cones.some((other) => other !== cone && Math.abs(other[0] - cone[0]) < 0.5)), x);
+  if (!next) return null;
+  const beside = line.reduce((a, b) => (Math.abs(a[0] - next[0]) <= Math.abs(b[0] - next[0]) ? a : b));
+  return { x: next[0], y: next[1], side: Math.sign(beside[1] - next[1]) };
+}
+
 export class Drive {
   constructor(socket, say) {
     this.socket = socket;
@@ -24,7 +47,7 @@ export class Drive {
     $("course").addEventListener("change", () => { this.ofCourse(); this.prepare(); });
     $("drive-vehicle").addEventListener("change", () => this.prepare());
     $("drive-controller").addEventListener("change", () => this.control($("drive-controller").value));
-    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.act({ mu: +$("drive-mu").value }); this.compared = false; }]]) {
+    for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.start_mu = +$("drive-mu").value; this.act({ mu: this.start_mu }); this.compared = false; }]]) {
       $(id).addEventListener("input", () => { this.values(); write(); });
       $(id).addEventListener("change", () => { if (!this.running) { this.startAt(+$("drive-speed").value, +$("drive-mu").value); this.prepare(); } });
     }
@@ -32,7 +55,8 @@ export class Drive {
     $("hold").addEventListener("change", () => this.hold());
     $("start").addEventListener("click", () => this.act({ go: true }, true));
     $("end").addEventListener("click", () => this.end());
-    $("again").addEventListener("click", () => this.prepare());
+    $("again").addEventListener("click", () => this.restart());
+    $("drive-report").addEventListener("click", () => this.socket.send({ kind: "report", drive: true }));
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
     addEventListener("blur", () => { this.pressed.clear(); this.hands(); });
@@ -63,19 +87,29 @@ export class Drive {
     this.choose({});
   }
 
-  // Choose what the address names: #drive=lane_change&vehicle=sedan&controller=ars&speed_kmh=60&mu=0.5
-  choose({ drive, vehicle = "compact", controller = "none", speed_kmh, mu }) {
+  // Choose what the address names, and return what is wrong with it: #drive=lane_change&vehicle=sedan&controller=ars&speed_kmh=60&mu=0.5
+  choose({ drive, vehicle, controller = "none", speed_kmh, mu, ...unknown }) {
     if (courses[drive]) $("course").value = drive;
     this.ofCourse();
-    for (const [id, name] of [["drive-vehicle", vehicle], ["drive-controller", controller]]) offer($(id), name);
-    const inside = (id, value) => (Number.isFinite(+value) ? Math.min(+$(id).max, Math.max(+$(id).min, +value)) : +$(id).value);
-    this.startAt(inside("drive-speed", speed_kmh), inside("drive-mu", mu));
+    for (const [id, name] of [["drive-vehicle", vehicle ?? (courses[$("course").value].vehicle || "compact")], ["drive-controller", controller]]) offer($(id), name);
+    const told = Object.keys(unknown).map((key) => `The address has an unknown key: ${key}.`);
+    if (drive && !courses[drive]) told.unshift(`There is no course ${drive}; there are ${Object.keys(courses).join(", ")}.`);
+    const inside = (id, key, text) => {
+      const { min, max, value } = $(id);
+      if (text == null) return +value;
+      if (text === "" || !Number.isFinite(+text)) { told.push(`${key}=${text} is not a number, so ${value} is driven.`); return +value; }
+      if (+text < +min || +text > +max) told.push(`${key}=${text} is outside ${min} to ${max}. The nearest value is driven.`);
+      return Math.min(+max, Math.max(+min, +text));
+    };
+    this.startAt(inside("drive-speed", "speed_kmh", speed_kmh), inside("drive-mu", "mu", mu));
+    return told.join(" ");
   }
 
   // On a small screen, the choices fold away while the car drives; a short one has no room for them before.
   fold() {
-    document.body.classList.toggle("driving", this.running);
-    $("drive-setup").open = !(short.matches || (this.running && small.matches));
+    const driving = this.running || this.again;
+    document.body.classList.toggle("driving", driving);
+    $("drive-setup").open = !(short.matches || (driving && small.matches));
   }
 
   show(shown) {
@@ -90,14 +124,15 @@ export class Drive {
     return new URLSearchParams({ drive: $("course").value, vehicle: $("drive-vehicle").value, controller: $("drive-controller").value, speed_kmh: this.start_kmh, mu: this.start_mu });
   }
 
-  // Speed and friction of the course, until they are moved.
+  // Speed and friction of the course, until they are moved, and its car, if it has one.
   ofCourse() {
     const course = courses[$("course").value];
+    if (course.vehicle) offer($("drive-vehicle"), course.vehicle);
     for (const goal of document.querySelectorAll(".goal")) goal.textContent = course.goal;
     this.startAt(course.speed_kmh, course.mu);
   }
 
-  // Speed and friction at the start, to which a restart returns.
+  // Speed and friction at the start. A restart returns to this speed, and keeps the friction chosen while driving.
   startAt(speed_kmh, mu) {
     this.start_kmh = speed_kmh;
     this.start_mu = mu;
@@ -115,20 +150,35 @@ export class Drive {
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
-    this.startAt(this.start_kmh, this.start_mu); // they may have moved during the drive
+    this.again = false;
+    this.startAt(this.start_kmh, this.start_mu); // the speed may have moved during the drive
     history.replaceState(null, "", `#${this.address}`);
     this.ready = false;
     $("driven").textContent = ""; // of the last drive, perhaps of another course
+    $("drive-report").hidden = true;
     $("start").disabled = true;
     $("start").textContent = "Getting the car ready …";
     this.socket.send({ kind: "start", id: ++this.asked, maneuver: $("course").value, vehicle: $("drive-vehicle").value, controllers: [$("drive-controller").value], speed_kmh: this.start_kmh, mu: this.start_mu });
   }
 
-  failed() { $("start").textContent = "Cannot drive: choose another control or car"; }
+  // Put the car at the start again, where it drives off at once.
+  restart() {
+    if (!this.ready) return;
+    this.prepare();
+    this.again = true;
+  }
+
+  failed() {
+    this.again = false;
+    this.fold();
+    $("waiting").hidden = false;
+    $("start").textContent = "Cannot drive: choose another control or car";
+  }
 
   begin(header, arrays) {
     if (header.id !== this.asked) return;
     this.ready = true;
+    this.course = header;
     // Only drives of the same course with the same car, control, speed and friction can be compared.
     this.setting = String(this.address);
     this.timed = header.cones.length > 0 || header.radius_m > 0;
@@ -142,6 +192,7 @@ export class Drive {
     this.frames = [];
     this.struck = this.passed = this.penalty_s = 0;
     this.previous = null;
+    if (this.again) { this.act({ go: true }, true); return; }
     $("waiting").hidden = false;
     $("start").disabled = false;
     $("start").textContent = `Drive at ${number(+$("drive-speed").value, 0)} km/h`;
@@ -150,13 +201,14 @@ export class Drive {
 
   going() {
     this.running = this.compared = true;
-    this.pressed.clear();  // a key that was let go after the last drive
+    this.again = false;
     this.fold();
     this.latencies = [];
     $("start").blur();
     $("waiting").hidden = true;
     $("end").hidden = $("again").hidden = false;
     $("driven").textContent = "";
+    $("drive-report").hidden = true;
     this.hold();
   }
 
@@ -170,15 +222,18 @@ export class Drive {
   hold() { this.act({ speed_kmh: $("hold").checked ? +$("drive-speed").value : null }); }
 
   key(event, down) {
-    if (!this.shown || !this.running || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (down && event.key === "Escape") { this.end(); return; }
-    if (down && event.key.toLowerCase() === "r") { this.prepare(); return; } // also the way back from off the course
+    const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!down) this.pressed.delete(what);
+    if (!this.shown || event.ctrlKey || event.metaKey || event.altKey) return;
+    // Before the drive, a key that is held counts, but a list or a slider keeps its own keys.
+    if (!this.running && (["INPUT", "SELECT"].includes(event.target?.tagName) || event.key === " ")) return;
+    if (down && event.key === "Escape") { if (this.running) this.end(); return; }
+    if (down && event.key.toLowerCase() === "r") { if (this.running && !event.repeat) this.restart(); return; } // also the way back from off the course
     const place = Number(event.key) - 1;
     if (down && SWITCH[place]) { this.control(SWITCH[place]); return; }
-    const what = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!what) return;
     event.preventDefault();
-    if (down) this.pressed.add(what); else this.pressed.delete(what);
+    if (down) this.pressed.add(what);
     this.hands();
   }
 
@@ -225,6 +280,8 @@ export class Drive {
     scene.follow(["you"], dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [0, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
     this.gauges(header);
+    scene.mark(nextSide(this.course, poses[0]));
+    this.showWay(header.last_lap_s != null && !this.rounds ? null : wayBack(this.course, poses[0], poses[1]), poses);
     if (!this.running) return;
     scene.grow("you");
     this.frames.push({ time_s, poses });
@@ -236,6 +293,15 @@ export class Drive {
     if (this.sent.has(header.seen)) { this.answered = this.sent.get(header.seen); this.sent.clear(); }
   }
 
+  // An arrow that points back to the course, as seen in the picture.
+  showWay(way, [x, y]) {
+    $("way").hidden = !way;
+    if (!way) return;
+    const ahead = way.x - x, left = way.y - y;
+    $("way").firstElementChild.setAttribute("style", `transform: rotate(${((this.scene.heading ?? 0) - Math.atan2(left, ahead)) * 180 / Math.PI}deg)`);
+    $("way").lastElementChild.textContent = `course ${number(Math.hypot(ahead, left), 0)} m`;
+  }
+
   // Return where the last drive was at this time.
   before(time_s) {
     const { frames } = this.ghost;
@@ -244,20 +310,24 @@ export class Drive {
   }
 
   gauges(header) {
+    if (header.controller !== this.controlled) { this.controlled = header.controller; this.rear = this.front = false; }
+    this.rear ||= header.rear_deg != null;
+    this.front ||= header.superposition_deg != null;
     const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
     const rows = {
-      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(100 * header.friction_use, 0)} %`,
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(Math.min(100, 100 * header.friction_use), 0)} %`,
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
-      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg, 1)}°`,
-      "front steer added": `${number(header.superposition_deg, 1)}°`, control: header.controller,
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg ?? 0, 1)}°`,
+      "front steer added": `${number(header.superposition_deg ?? 0, 1)}°`, control: header.controller,
     };
     if (!$("gauges").children.length) {
-      $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
+      $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: ["speed", "time"].includes(name) ? "large" : PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
     const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
     gauge("cones").hidden = !cones;
-    gauge("rear steer").hidden = cones && small.matches; // a phone has no room for both
+    gauge("rear steer").hidden = !this.rear || (cones && small.matches); // a phone has no room for both
+    gauge("front steer added").hidden = !this.front;
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
@@ -277,6 +347,7 @@ export class Drive {
   ended(header) {
     this.running = false;
     this.fold();
+    if (!this.again) $("waiting").hidden = false;
     this.sent.clear();
     this.last = "";
     $("end").hidden = $("again").hidden = true;
@@ -292,6 +363,7 @@ export class Drive {
     // A small screen has no room for what few want to know.
     $("driven").replaceChildren(`${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
+    $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);
     else if (!this.shown) this.say(`The drive has ended. It is saved as ${header.file}.`, true);
   }

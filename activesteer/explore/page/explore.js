@@ -11,12 +11,16 @@ const TOLD_MS = 100; // time between two readings of the curves while they play
 const FIRST = { maneuver: "sine_with_dwell", vehicle: "compact", driver: "typical", controllers: ["none", "ars", "afs"] };
 
 export function say(text, hint = false) {
+  state.hinted = hint && !!text;
   $("message").textContent = text;
   $("alert").classList.toggle("hint", hint);
   $("alert").hidden = !text;
 }
 
-const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); });
+// A hint is gone with the next thing that the reader does.
+function unhint() { if (state.hinted) say(""); }
+
+const curves = new Curves($("curves"), (time) => { player.show(time, true); player.pause(); }, (is) => { $("whole").hidden = !is; });
 const track = new Track($("track"));
 const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
@@ -53,12 +57,17 @@ function readAddress() {
   const wanted = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   const explore = wanted.drive == null ? wanted : {};
   for (const id of NAMED) offer($(id), explore[id] ?? FIRST[id]);
-  const names = explore.controllers?.split(",") ?? FIRST.controllers;
+  const names = explore.controllers?.split(",").filter(Boolean) ?? FIRST.controllers;
   for (const name of names) if (!boxes().some((box) => box.value === name)) addBox(name);
   for (const box of boxes()) box.checked = names.includes(box.value);
   state.wanted = explore;
+  state.addressed = wanted.drive == null;
   describe();
-  if (wanted.drive != null) { drive.choose(wanted); show("drive"); } else if (drive.shown) show("explore");
+  if (wanted.drive != null) {
+    const told = drive.choose(wanted);
+    show("drive");
+    say(told, true);
+  } else if (drive.shown) show("explore");
 }
 
 function writeAddress() {
@@ -126,19 +135,26 @@ const hear = {
   description(header, arrays) {
     if (header.id !== state.id) return;
     showTitle(header.title);
+    $("note").textContent = "";
     state.sliders = header.sliders;
-    const limited = [];
+    const told = [];
     for (const { key, label, unit, low, high } of header.sliders) if (key in state.wanted) {
-      state.values[key] = Math.min(high, Math.max(low, +state.wanted[key])) || 0;
-      if (state.values[key] !== +state.wanted[key]) limited.push(`${label} ${state.wanted[key]} is outside ${low} to ${high} ${unit}`.trim());
+      const text = state.wanted[key], value = text === "" ? NaN : +text;
+      if (!Number.isFinite(value)) { told.push(`${key}=${text} is not a number, so the value of the file is driven.`); continue; }
+      state.values[key] = Math.min(high, Math.max(low, value));
+      if (state.values[key] !== value) told.push(`${label} ${text} is outside ${low} to ${`${high} ${unit}`.trim()}. The nearest value is driven.`);
     }
-    if (limited.length) say(`${limited.join("; ")}. The nearest value is driven.`, true);
+    // A slider may be missing for another controller; a key of an address must mean something.
+    const unknown = state.addressed ? Object.keys(state.wanted).filter((key) => ![...NAMED, "controllers"].includes(key) && !header.sliders.some((slider) => slider.key === key)) : [];
+    if (unknown.length) told.push(`The address has ${unknown.length > 1 ? "keys" : "a key"} without a slider here: ${unknown.join(", ")}.`);
+    state.addressed = false;
+    if (told.length) say(told.join(" "), true);
     state.wanted = {};
     showSliders();
     scene.setShape(header.shape, arrays);
     // A driver follows a path; an own one may do more.
     $("driver").disabled = header.steered && ![...$("driver").options].some(({ value }) => value.includes("."));
-    $("driver").title = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself." : "";
+    $("steered").textContent = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself, so there is no driver to choose." : "";
     if ($("driver").disabled) $("driver").value = FIRST.driver;
     asking.ask(false);
   },
@@ -146,6 +162,7 @@ const hear = {
   run(header, arrays) {
     if (header.id !== state.id) return;
     showTitle(header.title);
+    $("note").textContent = header.note ?? "";
     // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) { state.failed = state.id; say(`${header.name}: ${header.error}`); }
@@ -166,7 +183,7 @@ const hear = {
     asking.finished();
   },
 
-  saved(header) { $("saved").textContent = `saved ${header.files.join(", ")} in ${header.folder}`; },
+  saved(header) { $("saved").textContent = header.files.length ? `saved ${header.files.join(", ")} in ${header.folder}` : `these runs are already saved: ${header.exist.join(", ")} in ${header.folder}`; },
   report() { window.open("report", "_blank"); },
   error(header) {
     if (["run", "describe"].includes(header.about) && header.id !== state.id) return; // of an older choice
@@ -241,12 +258,12 @@ function showTitle(title) {
 
 function showFigures() {
   showColours();
-  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value }) => value != null).map((figure) => [figure.title, figure])));
+  const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value, lost }) => value != null || lost).map((figure) => [figure.title, figure])));
   const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);
-    return element("td", {}, number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
+    return element("td", {}, now?.lost ? "lost" : number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   const failed = runs.filter((run) => run.losses.length);
   rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("th", {}, swatchOf(run), `${shortName(run)} fails`), element("td", { colspan: runs.length }, run.losses.join("; ")))));
@@ -265,7 +282,7 @@ function showSliders() {
     return box;
   }));
   const before = $("group").value;
-  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, group[0].toUpperCase() + group.slice(1))));
+  $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, `Sliders: ${group}`)));
   if (groups.includes(before)) $("group").value = before;
   if (small.matches) showGroup();
 }
@@ -288,6 +305,7 @@ function sliderOf(slider) {
   const [factor, unit] = BIGGER[slider.unit] ?? [1, slider.unit], digits = Math.max(0, -Math.floor(Math.log10(slider.step * factor)));
   const write = () => { shown.textContent = `${number(+input.value * factor, digits)} ${unit}`; box.classList.toggle("changed", slider.key in state.values); };
   const moved = (dragging) => {
+    unhint();
     const value = Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step));
     if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
     else state.values[slider.key] = +value.toPrecision(9);
@@ -365,10 +383,16 @@ for (const id of NAMED) $(id).addEventListener("change", () => {
   describe();
 });
 $("group").addEventListener("change", showGroup);
-$("reset").addEventListener("click", () => { state.values = {}; showSliders(); asking.ask(false); });
+$("fold").addEventListener("click", () => {
+  const folded = $("tuning").classList.toggle("folded");
+  $("fold").textContent = folded ? "Show sliders" : "Hide";
+  $("fold").setAttribute("aria-expanded", String(!folded));
+});
+$("reset").addEventListener("click", () => { unhint(); state.values = {}; showSliders(); asking.ask(false); });
 $("play").addEventListener("click", () => { player.playing = !player.playing; $("play").textContent = player.playing ? "Pause" : "Play"; });
+$("whole").addEventListener("click", () => curves.whole());
 $("time").addEventListener("input", () => { player.pause(); player.show(+$("time").value); });
-$("save").addEventListener("click", () => { $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
+$("save").addEventListener("click", () => { unhint(); $("saved").textContent = "saving …"; socket.send({ kind: "save" }); });
 $("report").addEventListener("click", () => socket.send({ kind: "report" }));
 for (const what of ["command", "python"]) {
   $(`copy-${what}`).addEventListener("click", async ({ target }) => {

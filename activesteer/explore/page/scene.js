@@ -226,6 +226,19 @@ export class Scene {
     this.scene.add(this.surface);
   }
 
+  // An arrow above a cone, to the side on which to pass it.
+  mark(cone) {
+    if (!this.arrow) {
+      const shape = new THREE.Shape([[0.1, -0.1], [0.8, -0.1], [0.8, -0.3], [1.4, 0], [0.8, 0.3], [0.8, 0.1], [0.1, 0.1]].map(([x, y]) => new THREE.Vector2(x, y)));
+      this.arrow = new THREE.Mesh(new THREE.ShapeGeometry(shape), new THREE.MeshBasicMaterial({ color: 0x00a86b, side: THREE.DoubleSide }));
+      this.scene.add(this.arrow);
+    }
+    this.arrow.visible = !!cone;
+    if (!cone) return;
+    this.arrow.position.set(cone.x, cone.y, 0.9);
+    this.arrow.rotation.set(Math.PI / 2, cone.side * Math.PI / 2, 0);
+  }
+
   setCourse({ cones, lanes, radius = 0, line = [], patches = [], mu = 0.9 }) {
     this.tint(mu);
     this.course.clear();

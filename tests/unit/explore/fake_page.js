@@ -1,28 +1,37 @@
 // Just enough of a page to run explore.js without a browser; `sent` has the messages to the program.
 class FakeElement {
-  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle() {} }; }
+  constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle: () => (this.toggled = !this.toggled) }; }
   setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
-  append(...children) { this.children.push(...children.filter((child) => child instanceof FakeElement)); }
+  append(...children) { this.words = [this.words ?? "", ...children.filter((child) => typeof child === "string")].join(""); this.children.push(...children.filter((child) => child instanceof FakeElement)); }
   replaceChildren(...children) { this.children = children; }
   addEventListener(kind, act) { (this.listeners[kind] ??= []).push(act); }
   fire(kind, about = {}) { for (const act of this.listeners[kind] ?? []) act({ preventDefault() {}, ...about }); }
   all() { return this.children.flatMap((child) => [child, ...child.all()]); }
   querySelectorAll(what) { return this.all().filter((one) => (what === "details[open]" ? false : one.name === what)); }
   remove() {}
+  focus() {}
+  blur() {}
+  prepend() {}
+  style = { setProperty() {} };
+  get previousElementSibling() { return (this.before ??= new FakeElement("output")); }
+  get firstElementChild() { return (this.children[0] ??= new FakeElement("g")); }
+  get lastElementChild() { return this.children.at(-1); }
 }
 const named = new Map();
 export const $ = (id) => { if (!named.has(id)) named.set(id, new FakeElement(id)); return named.get(id); };
+Object.defineProperty(globalThis, "navigator", { value: {} });
 Object.assign(globalThis, {
-  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener() {}, matchMedia: () => ({ matches: false }),
+  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener(kind, act) { $("window").addEventListener(kind, act); }, matchMedia: () => ({ matches: false }),
   history: { replaceState: (_state, _title, address) => { location.hash = address; } },
-  document: { getElementById: $, createElement: (name) => new FakeElement(name) },
+  document: { body: new FakeElement("body"), querySelectorAll: () => [], getElementById: $, createElement: (name) => new FakeElement(name) },
 });
 export const sent = [];
 export let hear;
 export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
 export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); setShape() {} setSurface() {} draw() {} follow() {} }
+export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} mark() {} knock() {} lighten() {} draw() {} follow() {} }
+export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
 export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };
 export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
@@ -43,13 +52,13 @@ export function start() {
   finish();
 }
 export function describe() {
-  const { id } = sent.at(-1);
+  const { id } = sent.at(-1) ?? {};
   const slider = { key: "speed_kmh", label: "speed", unit: "km/h", group: "manoeuvre", low: 20, high: 160, step: 1, value: 80 };
   hear({ kind: "description", id, title: "Step steer, 80 km/h", sliders: [slider], shape: {} }, [[]]);
 }
 export function finish(title = "Step steer, 80 km/h") {
-  const { id } = sent.at(-1);
-  hear({ kind: "run", id, name: "none", title, error: "no curve in this test" }, [undefined]);
+  const { id } = sent.at(-1) ?? {};
+  hear({ kind: "run", id, name: "none", title, figures: [], losses: [] }, [undefined]);
   hear({ kind: "finished", id, command: "", python: "" }, []);
 }
 export const slider = () => $("sliders").querySelectorAll("input")[0];

@@ -13,7 +13,7 @@ import pytest
 import activesteer
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
-from activesteer.explore.drive import DriveSession
+from activesteer.explore.drive import COURSES, DriveSession
 from activesteer.explore.messages import Act, Start
 from activesteer.simulation.live_view import FramePacer
 
@@ -88,6 +88,22 @@ def test_the_gauges_of_a_car_that_spins_are_those_of_its_recording(tmp_path: Pat
             assert math.cos(angle_rad - math.radians(frame["sideslip_deg"])) > 0.99
 
 
+@pytest.mark.parametrize(("controller", "low_deg", "high_deg"), [
+    ("none", 30.0, math.inf), ("lqr", 0.0, 15.0), ("esc", 0.0, 15.0), ("integrated", 0.0, 15.0),
+])  # fmt: skip
+def test_a_key_to_the_left_and_then_to_the_right_on_snow_spins_only_the_car_without_control(
+    controller: str, low_deg: float, high_deg: float, tmp_path: Path
+) -> None:
+    car = drive("slippery", tmp_path, vehicle=COURSES["slippery"].vehicle, controllers=(controller,))
+    sideslip_deg = 0.0
+    for steer, until_s in ((0.0, 0.5), (1.0, 1.5), (-1.0, 3.0), (0.0, 5.0)):
+        car.act(Act(steer=steer))
+        while (header := car.frame().header)["time_s"] < until_s:
+            sideslip_deg = max(sideslip_deg, abs(header["sideslip_deg"]))
+    car.end()
+    assert low_deg < sideslip_deg < high_deg
+
+
 def test_the_hands_turn_no_faster_than_hands_and_no_further_than_a_full_turn(tmp_path: Path) -> None:
     car = drive("plane", tmp_path)
     car.act(Act(steer=1.0))
@@ -129,7 +145,7 @@ def test_speed_and_friction_change_while_the_car_drives(tmp_path: Path) -> None:
 
 
 def test_a_foot_on_the_brake_stops_the_car(tmp_path: Path) -> None:
-    car = drive("slippery", tmp_path)
+    car = drive("slippery", tmp_path, speed_kmh=40.0)
     car.act(Act(brake=1.0, steer=0.0))
     assert go(car, 5.0)["speed_kmh"] < 4.0
     car.end()
@@ -160,7 +176,7 @@ def test_each_cone_that_is_hit_adds_two_seconds_to_the_time(tmp_path: Path) -> N
     car.end()
 
 
-def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
+def test_a_course_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
     slalom, lane_change = drive("slalom", tmp_path), drive("lane_change", tmp_path)
     start, other = (next(car.start()).header for car in (slalom, lane_change))
     slalom.end()
@@ -174,7 +190,10 @@ def test_a_course_of_cones_alone_has_its_path_painted_on_the_road(tmp_path: Path
     beside_m = np.interp(cones[:, 0], x_m, y_m) - cones[:, 1]
     assert np.abs(beside_m).min() > 0.9
     assert (np.sign(beside_m[1:]) == -np.sign(beside_m[:-1])).sum() >= len(cones) // 2
-    assert other["line"] == []  # it has lanes
+    ends_m = {lane["start_x_m"]: lane for lane in other["lanes"]}
+    x_m, y_m = np.array(other["line"]).T
+    for start_m, lane in ends_m.items():  # through all its lanes
+        assert lane["right_y_m"] < np.interp(start_m, x_m, y_m) < lane["left_y_m"]
 
 
 def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:

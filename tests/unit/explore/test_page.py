@@ -49,6 +49,119 @@ def used(tmp_path: Path, events: str, address: str = "") -> Any:
     )
 
 
+def driven(tmp_path: Path, events: str) -> Any:
+    """Return the messages of a drive after events, with a fake document and a fake program."""
+    drive = (
+        (PAGE / "drive.js").read_text("utf-8").replace("./look.js", "./fake.mjs").replace("./scene.js", "./fake.mjs")
+    )
+    (tmp_path / "drive.mjs").write_text(drive)
+    (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
+    return script(
+        tmp_path,
+        f"""import {{ $ }} from "./fake.mjs";
+        import {{ Drive, nextSide, wayBack }} from "./drive.mjs";
+        const sent = [], drive = new Drive({{ send: (message) => sent.push(message) }}, () => {{}});
+        const key = (name, down = true) => $("window").fire(down ? "keydown" : "keyup", {{ key: name }});
+        const ready = () => drive.begin({{ id: drive.asked, cones: [], lanes: [], line: [], radius_m: 0 }}, []);
+        const frame = (more) => drive.frame({{ time_s: 1, speed_kmh: 60, sideslip_deg: 0, friction_use: 1.02,
+          ay_mps2: 0, yaw_rate_degps: 0, steering_wheel_deg: 0, cones: [], controller: "none", hold_kmh: 55,
+          penalty_s: 0, ...more }}, [[0, 0, 0]]);
+        const gauge = (name) => {{
+          const box = $("gauges").children.find((one) => one.children[0].words === name);
+          return box.hidden ? null : box.lastElementChild.textContent;
+        }};
+        $("drive-mu").max = $("drive-speed").max = 200;
+        $("course").value = "slalom";
+        $("drive-vehicle").value = "compact";
+        $("drive-controller").value = "none";
+        $("hold").checked = true;
+        drive.startAt(60, 0.9);
+        drive.show(true);
+        {events}
+        const starts = sent.filter((one) => one.kind === "start");
+        const steered = sent.filter((one) => one.steer != null).map((one) => one.steer);
+        const go = sent.filter((one) => one.go).length, result = globalThis.seen;
+        console.log(JSON.stringify({{
+          sent, starts: starts.map((one) => [one.speed_kmh, one.mu, one.controllers[0]]), steered, go, result }}));""",
+    )
+
+
+GO = "ready(); $('start').fire('click'); drive.going();"
+ENDED = "drive.ended({ time_s: 3, behind_s: 0, file: 'drive.mcap', folder: '/f', error: '' });"
+
+
+def test_a_restart_drives_at_once_with_the_friction_and_the_controller_chosen_while_driving(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} frame();
+        $("drive-mu").value = "0.35"; $("drive-mu").fire("input");
+        key("4"); key("r"); {ENDED} ready(); drive.going();""",
+    )
+    assert page["starts"] == [[60, 0.9, "none"], [60, 0.35, "lqr"]]  # the speed is that of the start
+    assert page["go"] == 2  # without a second press of the button
+    assert driven(tmp_path, f"{GO} frame(); $('end').fire('click'); {ENDED} ready();")["go"] == 1
+
+
+def test_a_key_held_before_the_start_steers_from_the_start(tmp_path: Path) -> None:
+    held = driven(tmp_path, f"key('ArrowLeft'); {GO} drive.hands();")
+    assert held["steered"] == [1]
+    let_go = driven(tmp_path, f"key('ArrowLeft'); key('ArrowLeft', false); {GO} drive.hands();")
+    assert let_go["steered"] == [0]
+    after = driven(tmp_path, f"{GO} frame(); key('a'); key('r'); {ENDED} ready(); drive.going(); drive.hands();")
+    assert after["steered"] == [1, 1]  # still held after a restart
+
+
+def test_a_drive_that_has_ended_can_be_opened_as_a_report(tmp_path: Path) -> None:
+    shown = "$('drive-report').hidden"
+    page = driven(
+        tmp_path,
+        f"""const seen = [{shown}]; {GO} frame(); {ENDED} seen.push({shown}); $("drive-report").fire("click");
+        {GO} seen.push({shown}); globalThis.seen = seen;""",
+    )
+    assert page["result"][1:] == [False, True]
+    assert {"kind": "report", "drive": True} in page["sent"]
+
+
+def test_gauges_show_at_most_all_grip_and_only_angles_that_the_controller_adds(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} globalThis.seen = [];
+        const see = () => seen.push(["grip used", "rear steer", "front steer added"].map(gauge));
+        frame({{ rear_deg: null, superposition_deg: null }}); see();
+        frame({{ controller: "ars", rear_deg: 1.25, superposition_deg: null }}); see();
+        frame({{ controller: "ars", rear_deg: null, superposition_deg: null }}); see();
+        frame({{ controller: "none", rear_deg: null, superposition_deg: null }}); see();""",
+    )
+    assert page["result"] == [
+        ["100 %", None, None],
+        ["100 %", "1.3°", None],
+        ["100 %", "0.0°", None],  # straight ahead, still a controller with rear steering
+        ["100 %", None, None],
+    ]
+
+
+def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """const plane = { radius_m: 0, lanes: [], cones: [], line: [] }, pad = { ...plane, radius_m: 40 };
+        const course = { ...plane, cones: [[80, 0], [50, 0]], line: [[0, 0], [50, 2], [80, -2], [90, 0]] };
+        globalThis.seen = [wayBack(course, 49, 3), wayBack(course, 40, 30), wayBack(course, 60, 30),
+          wayBack(course, 200, 0), wayBack(pad, 100, 40), wayBack(pad, 0, 1), wayBack(plane, 900, 900)];""",
+    )
+    next_one, second, start, circle = {"x": 50, "y": 0}, {"x": 80, "y": 0}, {"x": 0, "y": 0}, {"x": 40, "y": 40}
+    assert page["result"] == [None, next_one, second, start, circle, None, None]
+
+
+def test_the_next_cone_of_a_slalom_has_the_side_on_which_the_line_passes_it(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """const line = [[0, 0], [50, 2], [80, -2], [110, 0]];
+        const course = { lanes: [], cones: [[50, 0], [80, 0], [110, -2], [110, 2]], line };
+        globalThis.seen = [0, 55, 90].map((x) => nextSide(course, x)?.side ?? null);""",
+    )
+    assert page["result"] == [1, -1, None]  # a pair of cones is a gate
+
+
 def asked(tmp_path: Path, events: str) -> list[Any]:
     """Return the values of the slider that are sent, each with whether it was dragged."""
     return script(
@@ -160,8 +273,68 @@ def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> Non
     assert "speed_kmh=95" in page["address"]
 
 
+@pytest.mark.parametrize(("address", "value", "words"), [
+    ("speed_kmh=abc", None, "speed_kmh=abc is not a number"),
+    ("speed_kmh=999", 160, "speed 999 is outside 20 to 160 km/h"),
+    ("speed_kmh=90&sped=3", 90, "a key without a slider here: sped"),
+    ("speed_kmh=90", 90, ""),
+])  # fmt: skip
+def test_what_is_wrong_in_an_address_is_told(address: str, value: float | None, words: str, tmp_path: Path) -> None:
+    page = used(tmp_path, "", f"#maneuver=step_steer&controllers=none&{address}")
+    assert page["before"][-1]["values"] == ({} if value is None else {"speed_kmh": value})
+    assert (words in page["message"]) if words else page["message"] == ""
+
+
+def test_an_address_without_a_controller_asks_for_one(tmp_path: Path) -> None:
+    page = used(tmp_path, "", "#maneuver=step_steer&controllers=")
+    assert page["before"] == []
+    assert page["message"] == "Choose at least one controller."
+
+
+def test_the_address_of_a_drive_is_checked(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        """$("drive-speed").min = 20;
+        globalThis.seen = [{ drive: "slalom", speed_kmh: "abc" }, { drive: "slalm" }, { drive: "slalom", sped: "3" },
+          { drive: "slalom", speed_kmh: "900" }, { drive: "slalom", speed_kmh: "50" }].map((one) => drive.choose(one));
+        seen.push(drive.start_kmh);""",
+    )
+    number, course, key, outside, right, speed_kmh = page["result"]
+    assert number.startswith("speed_kmh=abc is not a number")
+    assert "There is no course slalm" in course
+    assert "unknown key: sped" in key
+    assert "outside 20 to 200" in outside
+    assert right == ""
+    assert speed_kmh == 50
+
+
+def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
+    fifth = 'tick("lqr", true); describe(); tick("esc", true);'
+    assert used(tmp_path, fifth)["message"].startswith("esc is not driven")
+    for action in ("$('save').fire('click');", "drag(90);"):
+        assert used(tmp_path, fifth + action)["message"] == ""
+    error = "hear({ kind: 'error', text: 'no such file', about: null }, []);"
+    assert used(tmp_path, error + "$('save').fire('click');")["message"] == "no such file"  # an error stays
+
+
+def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const of = (lost, value) => [{ title: "Peak sideslip", unit: "deg", value, digits: null, lost }];
+        const id = sent.at(-1)?.id ?? before.at(-1).id;
+        hear({ kind: "run", id, name: "none", title: "", figures: of(true, null), losses: [] }, [undefined]);
+        hear({ kind: "run", id, name: "ars", title: "", figures: of(true, null), losses: [] }, [undefined]);
+        hear({ kind: "run", id, name: "afs", title: "", figures: of(false, 3), losses: [] }, [undefined]);
+        $("saved").textContent = JSON.stringify($("figures").querySelectorAll("td").map(({ words }) => words));""",
+    )
+    assert json.loads(page["saved"]) == ["lost", "lost", "3.00"]
+
+
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
     reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"
+    again = "{ kind: 'saved', files: [], exist: ['a.mcap'], folder: '/f' }"
+    shown = used(tmp_path, f"$('save').fire('click'); hear({again}, []);")["saved"]
+    assert shown == "these runs are already saved: a.mcap in /f"
     refused = "{ kind: 'error', text: 'there is no run', about: 'save' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({refused}, []);")["saved"] == "there is no run"

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.errors import ManeuverError, ParameterError
+from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
-from activesteer.explore.runs import Reply, Runs
+from activesteer.explore.runs import Reply, Runs, slip_limit_deg
 from activesteer.resources import find_maneuver, list_maneuvers
+from activesteer.scenario import resolve
+from activesteer.tyre.evaluation import MagicFormula
 
 OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
 SEARCHING = ("brake_in_turn", "fishhook", "sine_with_dwell", "step_steer", "split_mu_braking")
@@ -51,6 +53,43 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
 
 
 @pytest.mark.parametrize(
+    ("maneuver", "key", "values"),
+    [
+        ("sine_with_dwell", "steer.steering_wheel_deg", {"road.mu": 0.35, "steer.amplitude_factor": 4.0}),
+        ("step_steer", "steer.steering_wheel_deg", {"road.mu": 0.2}),
+        ("fishhook", "reference_angle_deg", {"road.mu": 0.3}),
+        ("brake_in_turn", "turn.steering_wheel_deg", {"road.mu": 0.3}),
+    ],
+)
+def test_a_search_that_fails_keeps_the_amplitude_which_command_and_title_give(
+    maneuver: str, key: str, values: dict[str, float], tmp_path: Path
+) -> None:
+    def steering(run: Reply) -> Any:
+        wheel = next(panel for panel in run.header["plots"]["panels"] if panel["title"].startswith("Steering wheel"))
+        return wheel["series"][0]["values"]
+
+    runs = Runs(Folder(tmp_path))
+    choice = {"maneuver": maneuver, "controllers": ("none",)}
+    (dry, _) = runs.run(RunRequest(**choice), lambda: False)
+    (held, _) = runs.run(RunRequest(**choice, values=values, dragging=True), lambda: False)
+    (kept, done) = runs.run(RunRequest(**choice, values=values), lambda: False)
+    assert steering(kept) == pytest.approx(steering(held), abs=0.02)
+    assert "does not reach" in kept.header["note"]
+    assert dry.header["note"] == held.header["note"] == ""
+    angle = float(done.header["command"].partition(f"{key}=")[2].split()[0])
+    assert "dry" not in kept.header["title"]
+    if maneuver != "fishhook":  # its title is in words
+        assert f"{angle:.3g} deg" in kept.header["title"]
+        assert f" {angle:.0f} deg" in kept.header["note"]
+    repeated = {**values, key: angle}
+    repeated.pop("steer.amplitude_factor", None)
+    again = activesteer.simulate(maneuver, "none", overrides=repeated)
+    assert math.degrees(np.abs(again["steering_wheel_rad"]).max()) == pytest.approx(
+        np.abs(np.array(steering(kept), float)).max(), abs=0.05
+    )
+
+
+@pytest.mark.parametrize(
     "maneuver",
     [pytest.param(name, marks=[] if name in SEARCHING else pytest.mark.slow) for name in list_maneuvers()],
 )
@@ -72,8 +111,8 @@ def test_what_has_failed_leaves_nothing_to_save_and_a_command_names_the_controll
     assert "-c none" in done.header["command"]
     assert "tv" not in done.header["command"]  # this car has no electric axle
     assert len(runs.save().header["files"]) == 1
-    with pytest.raises(ManeuverError, match="too slippery"):
-        list(runs.run(RunRequest(maneuver="step_steer", values={"road.mu": 0.2}), lambda: False))
+    with pytest.raises(ParameterError, match="must be"):
+        list(runs.run(RunRequest(maneuver="step_steer", values={"road.mu": 9.0}), lambda: False))
     with pytest.raises(ParameterError, match="no run to save"):
         runs.save()
 
@@ -89,6 +128,56 @@ def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
     lost, held, _ = (reply.header for reply in Runs(Folder(tmp_path)).run(choice, lambda: False))
     assert lost["losses"] == ["lost: 45 deg of peak sideslip"]
     assert held["losses"] == []
+
+
+def test_a_car_that_turns_round_has_its_sideslip_within_half_a_turn_and_no_figures(tmp_path: Path) -> None:
+    choice = RunRequest(maneuver="sine_with_dwell", controllers=("none",), values={"steer.amplitude_factor": 8.0})
+    runs = Runs(Folder(tmp_path))
+    run, _ = runs.run(choice, lambda: False)
+    runs.save()
+    recorded_deg = np.degrees(activesteer.Recording.open(tmp_path / "sine_with_dwell-none.mcap")["sideslip_rad"])
+    assert np.abs(np.unwrap(recorded_deg, period=360.0)).max() > 185.0  # it turns round
+    panel = next(panel for panel in run.header["plots"]["panels"] if panel["title"] == "Sideslip angle")
+    drawn = np.array(panel["series"][0]["values"], float)
+    assert np.nanmax(np.abs(drawn)) <= 180.0
+    assert drawn[0] == pytest.approx(recorded_deg[0], abs=0.1)
+    assert drawn[-1] == pytest.approx(recorded_deg[-1], abs=0.5)  # the last one that is drawn
+    assert 0 < np.isnan(drawn).sum() <= 3  # a gap, and not a line across the plot
+    figures = {figure["title"]: figure for figure in run.header["figures"]}
+    assert figures["Peak sideslip"]["lost"]
+    assert figures["Peak sideslip"]["value"] is None
+
+
+def test_runs_are_saved_once_until_they_change_or_their_file_is_gone(tmp_path: Path) -> None:
+    runs, choice = Runs(Folder(tmp_path)), RunRequest(maneuver="step_steer", controllers=("none",))
+    list(runs.run(choice, lambda: False))
+    assert runs.save().header["files"] == ["step_steer-none.mcap"]
+    again = runs.save().header
+    assert (again["files"], again["exist"]) == ([], ["step_steer-none.mcap"])
+    (tmp_path / "step_steer-none.mcap").unlink()
+    assert runs.save().header["files"] == ["step_steer-none.mcap"]
+    list(runs.run(choice, lambda: False))
+    assert runs.save().header["files"] == ["step_steer-none_2.mcap"]
+
+
+def test_room_to_the_edge_of_the_lane_is_positive_inside(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    run, _ = runs.run(RunRequest(maneuver="double_lane_change", controllers=("ars",)), lambda: False)
+    room = next(figure for figure in run.header["figures"] if figure["title"] == "Room to the edge of the lane")
+    runs.save()
+    (path,) = tmp_path.glob("*.mcap")
+    assert room["value"] == pytest.approx(-activesteer.Recording.open(path).metrics["lane_overstep_m"])
+
+
+def test_less_friction_gives_a_smaller_slip_angle_of_the_largest_side_force() -> None:
+    scenario = resolve("step_steer")
+    dry, snow = slip_limit_deg(scenario, 0.9), slip_limit_deg(scenario, 0.3)
+    assert dry == pytest.approx(7.5, abs=0.5)
+    assert snow == pytest.approx(2.5, abs=0.5)
+    rear, load_N = MagicFormula(scenario.car.tyres[1]), scenario.car.config.single_track.wheel_loads_N[1]
+    before, at, after = (abs(rear.evaluate(load_N, 0.0, math.radians(dry + more)).fy_N) for more in (-3.0, 0.0, 3.0))
+    assert max(before, after) < at
+    assert slip_limit_deg(resolve("step_steer", "bmw_m8"), 0.9) is None  # its curve is flat
 
 
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:

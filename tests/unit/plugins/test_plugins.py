@@ -547,3 +547,10 @@ def test_misspelt_attribute_is_answered_with_the_nearest(write, body, attribute)
     path = write(f"class Mine:\n    {body}{step}".replace("            def", "    def"))
     with pytest.raises(ControllerError, match=f"did you mean .*{attribute}"):
         controller_spec(f"{path}:Mine").make(setup()).step(steering(0.0), measured(0.0))
+
+
+def test_a_syntax_error_names_only_the_users_file_and_line(write: Any) -> None:
+    with pytest.raises(ControllerError) as caught:
+        controller_spec(write("class Mine:\n    def step(self, command, measurement)\n        return None\n") + ":Mine")
+    assert "mine.py, line 4" in str(caught.value)
+    assert "frozen" not in str(caught.value)
