@@ -37,7 +37,7 @@ export class Drive {
     this.socket = socket;
     this.say = say;
     this.pressed = new Set();
-    this.shown = this.running = this.held = false;
+    this.shown = this.running = this.held = this.again = false;
     this.number = this.asked = 0;
     this.sent = new Map();
     this.last = "";
