@@ -37,7 +37,7 @@ export class Drive {
     this.socket = socket;
     this.say = say;
     this.pressed = new Set();
-    this.shown = this.running = this.held = false;
+    this.shown = this.running = this.held = this.again = false;
     this.number = this.asked = 0;
     this.sent = new Map();
     this.last = "";
@@ -192,7 +192,7 @@ export class Drive {
     this.frames = [];
     this.struck = this.passed = this.penalty_s = 0;
     this.previous = null;
-    if (this.again) { this.act({ go: true }, true); return; }
+    if (this.again && this.shown) { this.act({ go: true }, true); return; }
     $("waiting").hidden = false;
     $("start").disabled = false;
     $("start").textContent = `Drive at ${number(+$("drive-speed").value, 0)} km/h`;
@@ -345,6 +345,8 @@ export class Drive {
   }
 
   ended(header) {
+    const told = `The drive has ended. It is saved as ${header.file}.`;
+    if (!this.frames) { this.say(told, true); return; } // a drive of the page before it was loaded again
     this.running = false;
     this.fold();
     if (!this.again) $("waiting").hidden = false;
@@ -365,6 +367,6 @@ export class Drive {
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);
-    else if (!this.shown) this.say(`The drive has ended. It is saved as ${header.file}.`, true);
+    else if (!this.shown) this.say(told, true);
   }
 }

@@ -154,7 +154,7 @@ const hear = {
     scene.setShape(header.shape, arrays);
     // A driver follows a path; an own one may do more.
     $("driver").disabled = header.steered && ![...$("driver").options].some(({ value }) => value.includes("."));
-    $("steered").textContent = $("driver").disabled ? "This manoeuvre sets the steering wheel angle itself, so there is no driver to choose." : "";
+    $("steered").textContent = $("driver").disabled ? "No driver: this manoeuvre steers itself." : "";
     if ($("driver").disabled) $("driver").value = FIRST.driver;
     asking.ask(false);
   },
