@@ -172,6 +172,7 @@ def test_room_to_the_edge_of_the_lane_is_positive_inside(tmp_path: Path) -> None
 def test_less_friction_gives_a_smaller_slip_angle_of_the_largest_side_force() -> None:
     scenario = resolve("step_steer")
     dry, snow = slip_limit_deg(scenario, 0.9), slip_limit_deg(scenario, 0.3)
+    assert dry is not None
     assert dry == pytest.approx(7.5, abs=0.5)
     assert snow == pytest.approx(2.5, abs=0.5)
     rear, load_N = MagicFormula(scenario.car.tyres[1]), scenario.car.config.single_track.wheel_loads_N[1]
