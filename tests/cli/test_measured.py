@@ -113,7 +113,7 @@ def test_what_was_fitted_is_printed_and_drives_the_car(call, truth, tmp_path):
     )
     told = call("fit", "fit.toml", "-o", "found", "--jobs", "1")
     assert told.status == 0
-    assert re.search(r"tyre cornering stiffness, +\d.\d+ ± \d", told.out)
+    assert re.search(r"tyre cornering stiffness factor, +\d.\d+ ± \d", told.out)
     assert "the remaining difference is" in told.out
     driven = call("run", "a.mcap", "--overrides", "found/overrides.toml", "--set", "settle_s=0.5", "-o", "b.mcap")
     assert driven.status == 0

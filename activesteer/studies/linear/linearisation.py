@@ -358,7 +358,8 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
 
 _LEAST_SHARE: Final = 0.005
 """Participation below it is left out."""
-_MODE_COLUMNS: Final = ("mode", "natural frequency [Hz]", "damping ratio", "eigenvalue [1/s]", "participation")
+_MODE_COLUMNS: Final = ("mode", "f0 [Hz]", "damping", "eigenvalue [1/s]", "participation")
+"""f0 is the natural frequency."""
 
 
 def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, ...]]:
@@ -376,7 +377,8 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
 def modes_page(title: str, modes: Sequence[Mode], bode: Picture, locus: Picture) -> Page:
     """Return the page of a linear car: modes, response to the steering wheel, and poles versus speed."""
     rows = [[cell.replace("+-", "\N{PLUS-MINUS SIGN}") for cell in row] for row in _mode_rows(modes, CUT_OFF_HZ)]
-    table = Table("", _MODE_COLUMNS, rows)
+    columns = ("mode", "natural frequency [Hz]", "damping ratio", *_MODE_COLUMNS[3:])
+    table = Table("", columns, rows)
     sections = [
         Section("From the steering wheel to the motion", pictures=[bode._replace(title="")]),
         Section(

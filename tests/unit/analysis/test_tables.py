@@ -18,7 +18,7 @@ def test_values_stand_under_their_run():
     text = comparison({"none": {"roll_peak_rad": math.radians(2.0)}, "ars": {"roll_peak_rad": math.radians(-1.5)}})
     head, row = text.splitlines()
     assert head.split() == ["none", "ars"]
-    assert row.split() == ["roll", "peak", "deg", "2.000", "-1.500"]
+    assert row.split() == ["peak", "roll", "angle", "deg", "2.000", "-1.500"]
     for label, value in (("none", "2.000"), ("ars", "-1.500")):
         assert head.index(label) + len(label) == row.index(value) + len(value)
 
@@ -39,7 +39,7 @@ def test_a_car_that_has_turned_round_has_lost_metrics_but_its_verdicts_remain():
     spun = {"sideslip_peak_abs_rad": math.pi, "ay_rms_mps2": 3.0, "stays_in_lanes": 0.0, "steering_wheel_rms_rad": 1.0}
     fine = {**spun, "sideslip_peak_abs_rad": 0.5, "stays_in_lanes": 1.0}
     rows = {line.split()[0]: line.split()[-2:] for line in comparison({"none": spun, "ars": fine}).splitlines()[1:]}
-    assert rows["sideslip"] == ["lost", "28.648"]
+    assert rows["largest"] == ["lost", "28.648"]
     assert rows["lateral"] == ["lost", "3.000"]
     assert rows["stays"] == ["no", "yes"]
     assert rows["steering"] == ["57.296", "57.296"]
