@@ -130,7 +130,7 @@ class TorqueVectoringParameters(YawMomentParameters):
 
 @dataclass(frozen=True)
 class IntegratedParameters:
-    """Parameters of the brakes that assist the steering of `lqr` (`integrated`); see also [controllers.lqr].
+    """Parameters of the brakes that assist the steering of `lqr` (`integrated`).
 
     A missing moment as large as its scale in [controllers.lqr] and a brake force as large as its scale cost the same.
     """

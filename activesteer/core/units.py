@@ -194,7 +194,7 @@ def parameter_label(key: str) -> tuple[str, str]:
     stem, unit = split_ending(key)
     *tables, name = stem.split(".")
     within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
-    what = parameter_words(name) + " factor" * (tables[-1:] == ["factors"])
+    what = parameter_words(name) + (" factor" if tables[-1:] == ["factors"] else "")
     return f"{within}: {what}" if within else what, _POWER.sub(lambda power: "²³⁴⁵"[int(power[0]) - 2], unit.name)
 
 

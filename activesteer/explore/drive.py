@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -172,6 +172,11 @@ class DriveSession:
         course = self._simulation.scenario.maneuver.course
         return np.empty((0, 2)) if course is None else course.cone_centres_m()
 
+    @property
+    def _hit(self) -> int:
+        """Number of cones that the car has hit."""
+        return int(np.sum(~self._standing))
+
     def start(self) -> Iterator[Reply]:
         """Yield the course with the shape of the car, then the frame at the start."""
         course = self._simulation.scenario.maneuver.course
@@ -230,7 +235,7 @@ class DriveSession:
         data = loop.vehicle.data
         fallen = self._hit_cones()
         self._time_laps()
-        penalty_s = _CONE_S * float(np.sum(~self._standing))
+        penalty_s = _CONE_S * self._hit
         speed_mps = math.hypot(motion.speed_mps, motion.lateral_speed_mps)
         sideslip_deg = math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if speed_mps > 1.0 else 0.0
         header = {
@@ -307,14 +312,14 @@ class DriveSession:
 
     def _result(self) -> str:
         """Describe the time of the last lap or of the gates, with the cones, or return an empty text."""
-        hit = int(np.sum(~self._standing))
-        cones = f"{hit} cone{'s' * (hit != 1)} hit (+{hit * _CONE_S:g} s)" if hit else ""
+        penalty_s = _CONE_S * self._hit
+        cones = f"{self._hit} cone{'' if self._hit == 1 else 's'} hit (+{penalty_s:g} s)" if self._hit else ""
         if self._missed:
             return ", ".join(filter(None, ("no time: a gate was missed", cones)))
         if self._last_lap_s is None:
             return cones
         word = "last lap" if self._course.radius_m else "time"
-        return ", ".join(filter(None, (f"{word} {self._last_lap_s + hit * _CONE_S:.2f} s", cones)))
+        return ", ".join(filter(None, (f"{word} {self._last_lap_s + penalty_s:.2f} s", cones)))
 
     def end(self) -> Reply:
         """Complete the recording of a drive."""
@@ -326,7 +331,8 @@ class DriveSession:
                 # A drive is as long as its driver wants.
                 simulation.loop.end()
                 if result := self._result():
-                    simulation.note(result)
+                    with suppress(ActiveSteerError):  # a drive that failed has no result
+                        simulation.note(result)
                 simulation.end_file(simulation.recording())
         except ActiveSteerError as error:
             problem = str(error)

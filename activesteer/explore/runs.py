@@ -21,12 +21,12 @@ from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
-from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, run_looks
+from activesteer.core.conventions import CORNERS, run_looks
 from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
 from activesteer.core.units import parameter_label, parameter_words, split_ending
 from activesteer.drawing.car_model import scene_of
 from activesteer.drawing.cars import CHASSIS, dressed, height_colours
-from activesteer.drawing.panels import EXPLORE, PANELS
+from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
@@ -207,7 +207,6 @@ def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], 
     return drawn.plane_below_m, (corners_m.astype(np.float32), factors.astype(np.float32), triangles.astype(np.float32))
 
 
-_SIDESLIP: Final = PANELS["sideslip"].title
 _CHUNK: Final = 500
 """Steps between two looks for a newer choice; about 10 ms."""
 
@@ -271,7 +270,7 @@ class Runs:
                 return
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
-            drawn = _within_half_turn(plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE))
+            drawn = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
             run["losses"] = list(losses(recording.metrics))
             surface: tuple[NDArray[np.float32], ...] = ()
             if len(self._kept) == 1 and not choice.dragging:  # all runs have the same road
@@ -336,16 +335,12 @@ class Runs:
                 self._held_rad[key] = angle_rad
             return with_amplitude_found(scenario, angle_rad=angle_rad), overrides, "", ""
         except ManeuverError:
-            search = scenario.maneuver.search
-            if search is None:
+            if scenario.maneuver.search is None:
                 raise
             if key not in self._held_rad and (angle_rad := searched_angle(self._resolved(choice, {}))) is not None:
                 self._held_rad[key] = angle_rad
-        fixed, angle_deg = _fixed_amplitude(with_amplitude_found(scenario, angle_rad=self._held_rad[key]), overrides)
-        note = (
-            f"On this road, the car does not reach {search.lateral_acceleration_mps2 / GRAVITY_MPS2:.2g} g without "
-            f"control. Therefore, the steering wheel angle stays at {angle_deg:.0f} deg."
-        )
+        fixed, words = _fixed_amplitude(with_amplitude_found(scenario, angle_rad=self._held_rad[key]), overrides)
+        note = f"The search for the amplitude fails with these values, so the {words}."
         return with_amplitude_found(self._resolved(choice, fixed)), fixed, "", note
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
@@ -383,8 +378,8 @@ _SEARCHED: Final = {"steer": "steering_wheel", "turn": "steering_wheel", "": "re
 """Table of a manoeuvre, or none -> key of the steering wheel angle that a search finds, without its unit."""
 
 
-def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tuple[dict[str, float], float]:
-    """Return overrides that give the amplitude of a scenario without a search, and the amplitude [deg]."""
+def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tuple[dict[str, float], str]:
+    """Return overrides that give the amplitude of a scenario without a search, and the amplitude in words."""
     maneuver: Any = scenario.maneuver
     for table, name in _SEARCHED.items():
         owner = getattr(maneuver, table, None) if table else maneuver
@@ -393,7 +388,8 @@ def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tupl
             angle_deg = float(f"{math.degrees(angle_rad):g}")  # as the command repeats it
             useless = {f"{table}.{key}" for key in getattr(owner, "OVERRULED", {})}
             kept = {key: value for key, value in overrides.items() if key not in useless}
-            return {**kept, f"{table}.{name}_deg".lstrip("."): angle_deg}, angle_deg
+            words = f"{name.replace('_', ' ').removesuffix(' angle')} angle stays at {angle_deg:.0f} deg"
+            return {**kept, f"{table}.{name}_deg".lstrip("."): angle_deg}, words
     raise ManeuverError(f"{maneuver.name}: the amplitude of this manoeuvre has no key")
 
 
@@ -416,6 +412,7 @@ _LARGEST_SLIP_DEG: Final = 20.0
 _CLEAR_DROP: Final = 0.01
 """Share by which the side force must fall behind its largest value. A flat curve has no slip angle to warn of."""
 _SPEED_MPS: Final = 20.0
+"""Speed of the wheel [m/s]; the side force hardly depends on it."""
 
 
 def slip_limit_deg(scenario: Scenario, mu: float) -> float | None:
@@ -428,17 +425,6 @@ def slip_limit_deg(scenario: Scenario, mu: float) -> float | None:
     largest = int(np.argmax(force_N))
     clear = force_N[-1] < (1.0 - _CLEAR_DROP) * force_N[largest]
     return round(float(angles_deg[largest]), 1) if clear else None
-
-
-def _within_half_turn(drawn: dict[str, Any]) -> dict[str, Any]:
-    """Return plots whose sideslip angles are within 180 deg, with a gap where the angle changes its sign there."""
-    for series in (one for panel in drawn["panels"] if panel["title"] == _SIDESLIP for one in panel["series"]):
-        unwrapped = np.array(series["values"], float)  # None is nan
-        if np.nanmax(np.abs(unwrapped), initial=0.0) > 180.0:
-            turns = np.round(unwrapped / 360.0)
-            wrapped = np.where(np.diff(turns, prepend=turns[:1]) == 0.0, unwrapped - 360.0 * turns, np.nan)
-            series["values"] = [None if math.isnan(value) else round(value, 2) for value in wrapped.tolist()]
-    return drawn
 
 
 def _figures(recording: Recording) -> list[dict[str, Any]]:

@@ -218,7 +218,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def controller(self) -> Any:
-        """Controller of the loop. You may replace it from the next step on; the control unit stays."""
+        """Controller of the loop. You may replace it from the next step on. The control unit stays."""
         self._store()
         return self.blocks[1]
 

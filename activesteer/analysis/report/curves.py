@@ -92,10 +92,19 @@ def _panel(panel: Panel, view: str, runs: Sequence[ReportedRun], grid: Array) ->
         with suppress(RecordingError):
             for dotted, values in _signals(panel, view, run.recording):
                 sampled = _reduced(run.recording.time_s, values * panel.quantity.factor, grid)
+                if panel.lines[0].channel.endswith("sideslip_rad"):
+                    sampled = _within_half_turn(sampled)
                 series.append({"run": number, "dotted": dotted, "values": _rounded(sampled)})
     note = panel.note if any(item["dotted"] for item in series) else panel.lines[0].name if not panel.extreme else ""
     shown = panel.quantity
     return {"title": panel.title, "unit": shown.unit.name, "note": note, "min_span": shown.min_span, "series": series}
+
+
+def _within_half_turn(angle_deg: Array) -> Array:
+    """Return a continuous angle within 180 deg, with a gap at each jump, so that no line crosses the plot."""
+    turns = np.round(angle_deg / 360.0)
+    # nan differs from itself, and stays nan.
+    return np.where(np.diff(turns, prepend=turns[:1]) == 0.0, angle_deg - 360.0 * turns, math.nan)
 
 
 def _sampled(time_s: Array, values: Array, grid: Array) -> Array:

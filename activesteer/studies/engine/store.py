@@ -107,7 +107,7 @@ class Store:
     """A study's folder, locked by one process."""
 
     def __init__(self, folder: Path, factors: Sequence[str]) -> None:
-        """Prepare the store; `opened` opens it."""
+        """Prepare the store, which `opened` opens."""
         self.folder = folder
         self._factors = tuple(factors)
         self._parts = folder / "parts"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import activesteer
-from activesteer.errors import ParameterError
+from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.drive import COURSES, DriveSession
 from activesteer.explore.messages import Act, Start
@@ -194,6 +194,27 @@ def test_a_course_has_its_path_painted_on_the_road(tmp_path: Path) -> None:
     x_m, y_m = np.array(other["line"]).T
     for start_m, lane in ends_m.items():  # through all its lanes
         assert lane["right_y_m"] < np.interp(start_m, x_m, y_m) < lane["left_y_m"]
+
+
+def test_a_drive_whose_controller_fails_is_saved_as_incomplete_with_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "fails.py").write_text(
+        "from activesteer import ActuatorCommand\n"
+        "class Fails:\n"
+        "    def step(self, command, measurement):\n"
+        "        if measurement.time_s > 6.0:\n"
+        "            raise ValueError('too late')\n"
+        "        return ActuatorCommand()\n"
+    )
+    car = drive("slalom", tmp_path, controllers=("fails.py:Fails",))
+    with pytest.raises(ActiveSteerError, match="too late"):
+        go(car, 7.0)
+    assert not car._standing.all()  # it has hit a cone, but a drive that failed has no result
+    assert car.end().header["error"] == ""
+    assert car.path is not None
+    recording = activesteer.Recording.open(car.path)
+    assert not recording.metadata["complete"]
+    assert "too late" in recording.metadata["error"]
+    assert recording.time_s[-1] == pytest.approx(6.0, abs=0.01)
 
 
 def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def test_a_search_that_fails_keeps_the_amplitude_which_command_and_title_give(
     (held, _) = runs.run(RunRequest(**choice, values=values, dragging=True), lambda: False)
     (kept, done) = runs.run(RunRequest(**choice, values=values), lambda: False)
     assert steering(kept) == pytest.approx(steering(held), abs=0.02)
-    assert "does not reach" in kept.header["note"]
+    assert "search for the amplitude fails" in kept.header["note"]
     assert dry.header["note"] == held.header["note"] == ""
     angle = float(done.header["command"].partition(f"{key}=")[2].split()[0])
     assert "dry" not in kept.header["title"]
