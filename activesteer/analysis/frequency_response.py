@@ -47,7 +47,7 @@ class FrequencyResponse(NamedTuple):
 
 
 def frequency_response(recording: RecordingLike, output: str, frequency_Hz: Array) -> FrequencyResponse:
-    """Return the response of a channel to the steering, at the spectral lines nearest to frequencies [Hz]."""
+    """Return the response of a channel to the steering, at the spectral lines nearest to given frequencies [Hz]."""
     count, step_s = len(recording.time_s), timestep(recording.time_s)
     u, y = np.fft.rfft(recording[INPUT]), np.fft.rfft(recording[output])
     lines_Hz = np.fft.rfftfreq(count, step_s)
@@ -119,7 +119,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _falls_to(x: NDArray[np.floating], y: Array, level: float) -> float:
-    """Return the first interpolated abscissa where y falls to a level, nan if y never does."""
+    """Return the first interpolated abscissa where y falls to a level, or nan if y never does."""
     below = np.flatnonzero((y[1:] <= level) & (y[:-1] > level))
     if below.size == 0:
         return math.nan

@@ -151,7 +151,7 @@ SIZES: Final[dict[str, float | None]] = {
 
 
 def measured(metrics: Metrics) -> dict[str, float]:
-    """Return the measures of harm that the manoeuvre of a run has [SI], infinite where the run does not define one."""
+    """Return the measures of harm that the manoeuvre of a run has [SI], infinite where the run defines none."""
     known = {name: math.nan if value is None else value for name, value in metrics.items()}
     missed = known.get(CONES_MISSED, 0.0)
     found = {"lost": float(has_spun(metrics) or missed != 0.0)}

@@ -152,7 +152,7 @@ def heading_at_end(recording: RecordingLike, path_x_m: Array, path_y_m: Array) -
 
 
 def places_along(x_m: Array, y_m: Array, path: Path) -> tuple[Array, Array]:
-    """Return the position of a car relative to a path: distance along it and to its left [m]."""
+    """Return the position of a car relative to a path: distances along the path and to its left [m]."""
     along, beside = np.empty(len(x_m)), np.empty(len(x_m))
     at = 0
     for row, (x, y) in enumerate(zip(x_m.tolist(), y_m.tolist(), strict=True)):

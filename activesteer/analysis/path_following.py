@@ -32,7 +32,7 @@ OSCILLATING: Final = ("yaw_rate_radps", "sideslip_rad", "ay_mps2", "steering_whe
 
 
 def path_following_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics of a run along a path, nan if a metric cannot be evaluated.
+    """Return the metrics of a run along a path, with nan where a metric cannot be evaluated.
 
     - Sizes: `<name>_peak_abs_<unit>`, `<name>_rms_<unit>` of yaw rate, sideslip, lateral acceleration (`ay`) and roll
       over the whole run, sideslip above 10 km/h. `<name>_gates_rms_<unit>` and `<name>_after_gates_rms_<unit>` of the

@@ -45,7 +45,7 @@ _LONGEST: Final = 1000
 
 
 def distance(margin: float) -> float:
-    """Return the distance from passing: 0 if it passes, 0.5 one scale from the limit, towards 1 far away."""
+    """Return the distance from passing: 0 for a pass, 0.5 at one scale beyond the limit, towards 1 far beyond."""
     if margin >= 0.0:
         return 0.0
     return max(1e-6, margin / (margin - 1.0)) if math.isfinite(margin) else 1.0
@@ -105,7 +105,7 @@ class Expression:
             raise self._fail("there is no metric of a run, such as lane_overstep_m(none),")
 
     def __call__(self, runs: Runs) -> float:
-        """Return the value, nan if it is not defined."""
+        """Return the value, or nan if it is not defined."""
         return self._value(runs)
 
     def undefined(self, runs: Runs) -> set[str]:
@@ -189,7 +189,7 @@ class Requirement(Expression):
         return lambda runs: _all([margin(runs) for margin in margins])
 
     def _comparison(self, left: ast.expr, sign: ast.cmpop, right: ast.expr) -> _Number:
-        """Return the margin to the limit, the side without a metric, or else the right side."""
+        """Return the margin to the limit, which is the side without a metric, or else the right side."""
         one, other = self._number(left), self._number(right)
         self.comparisons.append((one, _SIGNS[type(sign)], other))
         less, more = (one, other) if isinstance(sign, (ast.Lt, ast.LtE)) else (other, one)
@@ -224,7 +224,7 @@ def _ratio(one: float, other: float) -> float:
 
 
 def _all(margins: Sequence[float]) -> float:
-    """Return the smallest margin, nan if it is not known."""
+    """Return the smallest margin, or nan if it is not known."""
     known = [margin for margin in margins if not math.isnan(margin)]
     return min(known) if len(known) == len(margins) or min(known, default=0.0) < 0.0 else math.nan
 

@@ -102,7 +102,7 @@ def rate_rms(values: Array, timestep_s: float) -> float:
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square, nan for no values."""
+    """Return the root mean square, or nan for no values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
 
 
@@ -211,7 +211,7 @@ _AVERAGED_S: Final = 0.1
 
 
 def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """Return the samples for zeroing: the second before the steering wheel turns fast."""
+    """Return the samples for zeroing: the last second before the steering wheel turns fast."""
     step_s = timestep(time_s)
     width = max(1, round(_AVERAGED_S / step_s))
     rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
@@ -226,6 +226,6 @@ def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
 
 
 def offset(values: Array, samples: slice) -> float:
-    """Return the mean of a signal over some samples, 0 for no samples."""
+    """Return the mean of a signal over some samples, or 0 for no samples."""
     # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
     return float(np.mean(values[samples])) if samples.stop > samples.start else 0.0

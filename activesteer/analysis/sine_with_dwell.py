@@ -224,5 +224,5 @@ def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> fl
 
 
 def _at(time_s: Array, values: Array, instant_s: float) -> float:
-    """Return the interpolated value at a time, nan after the end of the run."""
+    """Return the interpolated value at a time, or nan after the end of the run."""
     return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

@@ -73,7 +73,7 @@ def read_course(recording: RecordingLike) -> Course:
 
 
 def read_footprint(recording: RecordingLike) -> Footprint:
-    """Return the sizes of the car of a run."""
+    """Return the dimensions of the car of a run."""
     footprint = footprint_of(recording.metadata)
     if footprint is None:
         raise fail("car", "is missing: the sizes of the car are needed")

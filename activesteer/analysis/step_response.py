@@ -36,7 +36,7 @@ STEADY_CHANNELS: Final = ("steering_wheel_rad", "front_steer_rad", "rear_steer_r
 
 
 def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics of a step steer, nan if a metric cannot be evaluated.
+    """Return the metrics of a step steer, with nan where a metric cannot be evaluated.
 
     For yaw rate, lateral acceleration (`ay`), roll and sideslip: `<name>_steady_state_<unit>`, `<name>_response_time_s`
     (90 %), `<name>_peak_<unit>` and `<name>_peak_time_s` in the direction of the steady-state value, and

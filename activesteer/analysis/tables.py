@@ -78,7 +78,7 @@ def is_near(name: str, value: float, first: float) -> bool:
 
 
 class Cell(NamedTuple):
-    """Format a number, or a difference with its percentage of the first run's value if meaningful."""
+    """Cell of a table: a number or a difference, and a percentage of the first run's value if meaningful."""
 
     text: str
     percent: str = ""
@@ -93,7 +93,7 @@ def number(name: str, value: float) -> str:
 
 
 def difference_text(name: str, value: float, first: float) -> Cell:
-    """Write the difference of a metric [SI] from its value in the first run."""
+    """Format the difference of a metric [SI] from its value in the first run."""
     # The cell has a percentage too, if the first value is significant and positive.
     if not (math.isfinite(value) and math.isfinite(first)):
         return Cell("\N{EN DASH}")

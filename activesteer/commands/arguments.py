@@ -177,7 +177,7 @@ RECORDINGS: Final = option("files", "FILE.mcap", f"{_RECORDING}; several are com
 
 
 def driver(default: str = "") -> Part:
-    """Return the option `--driver`, None if not given."""
+    """Return the option `--driver`, or None if not given."""
     words = "novice, typical, expert, a driver file, my_file.py:MyDriver, or driver.fmu"
     if default:
         return option("--driver", "DRIVER", f"{words} (default: {default})")
@@ -185,7 +185,7 @@ def driver(default: str = "") -> Part:
 
 
 def controllers(default: str = "none") -> Part:
-    """Return the option `-c`, a list of controllers, None if not given."""
+    """Return the option `-c`, a list of controllers, or None if not given."""
     words = (
         "none, ars, afs or another of `activesteer list`, a variant's file, my_file.py:MyController?gain=2, or an FMU"
     )

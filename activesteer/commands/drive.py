@@ -263,7 +263,7 @@ def _output_paths(output: Path, maneuver: str, controllers: Sequence[Plugin]) ->
 
 
 def _check_settings(path: Path, scenario: Any, controller: Plugin) -> None:
-    """Refuse to replace a recording of a run with other settings."""
+    """Reject the replacement of a recording that was made with other settings."""
     from activesteer.config import leaves
     from activesteer.errors import RecordingError
     from activesteer.recording import Recording

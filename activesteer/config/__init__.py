@@ -70,12 +70,12 @@ class Source:
         )
 
     def placed(self, path: Sequence[str], reason: ActiveSteerError) -> ActiveSteerError:
-        """Return the error of a check with its place in the file added."""
+        """Add the place in the file to the error of a check, and return the error."""
         inner = reason.key.split(".") if reason.key else ()
         return self.fail((*path, *inner), reason.problem, reason.value, reason.allowed)
 
     def line_of(self, path: Sequence[str]) -> int | None:
-        """Return the line of a key in the file, because tomllib does not store it."""
+        """Find the line of a key in the file. tomllib does not store it."""
         wanted = ".".join(path)
         table = ""
         elements: dict[str, int] = {}
@@ -213,7 +213,7 @@ def fields_of(cls: type) -> dict[str, dataclasses.Field[Any]]:
 
 
 def dataclass_in(hint: Any) -> type | None:
-    """Return the dataclass that a field holds, None for other fields."""
+    """Return the dataclass that a field holds, or None for other fields."""
     for candidate in (hint, *typing.get_args(hint)):
         if isinstance(candidate, type) and dataclasses.is_dataclass(candidate):
             return candidate if typing.get_origin(hint) not in (dict, tuple) else None
@@ -350,7 +350,7 @@ def is_overruled(owner: Any, key: str) -> bool:
 
 
 def _overruling(owner: type, key: str, values: Mapping[Any, Any]) -> Mapping[str, Any]:
-    """Return the rule that makes a key ineffective, empty without one."""
+    """Return the rule that makes a key ineffective, empty if there is none."""
     rule = getattr(owner, "OVERRULED", {}).get(field_in_unit(key, fields_of(owner))[0], {})
     return rule if all(_holds(values[other], wanted) for other, wanted in rule.items()) else {}
 

@@ -153,7 +153,7 @@ class Fault:
 
     @property
     def size(self) -> float:
-        """Size in the unit of the part, 0 if the kind has none."""
+        """Size in the unit of the part, or 0 if the kind has none."""
         return next((value for name in _SIZES if (value := getattr(self, name)) is not None), 0.0)
 
     @property

@@ -54,7 +54,7 @@ class Child:
         return self._finalizer.alive
 
     def ask(self, request: bytes, doing: str, limit_s: float, max_bytes: int) -> bytes:
-        """Return the answer to a request. If there is none, kill the child and raise."""
+        """Return the answer to a request. If there is none, kill the child and raise an error."""
         if not self.alive:
             raise ChildFault(f"has ended, before {doing}")
         try:
@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return the reason for a missing answer, None for an exception of another origin."""
+        """Return the reason for a missing answer, or None for an exception of another origin."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)
@@ -118,7 +118,7 @@ def _kill(process: subprocess.Popen[bytes], connection: socket.socket) -> None:
 
 
 def _serve(connection: socket.socket, answer: Callable[[bytes], bytes]) -> None:
-    """Answer requests until the other side ends."""
+    """Answer requests until the other side closes the connection."""
     with connection.makefile("rwb") as stream:
         while len(head := stream.read(_LENGTH.size)) == _LENGTH.size:
             content = answer(stream.read(*_LENGTH.unpack(head)))

@@ -99,7 +99,7 @@ def check_count(count: int, most: int, what: str, error: type[ActiveSteerError],
 
 
 def check_number(value: float, error: type[ActiveSteerError], *, text: Any = None, **place: Any) -> None:
-    """Reject a number that is not finite or above `MAX_NUMBER`."""
+    """Reject a number that is not finite or exceeds `MAX_NUMBER`."""
     given = value if text is None else text
     if not math.isfinite(value):
         raise error(f"{shown(given)} is not a finite number", value=given, **place)

@@ -76,7 +76,7 @@ class Path:
 
     @classmethod
     def between(cls, x_m: Array, y_m: Array) -> Path:
-        """Create a path of known points, with arc length, heading and curvature by differences between them."""
+        """Create a path from known points, with arc length, heading and curvature by finite differences."""
         s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(y_m)))])
         heading = np.unwrap(np.arctan2(np.gradient(y_m, s), np.gradient(x_m, s)))
         x_m, y_m = np.ascontiguousarray(x_m), np.ascontiguousarray(y_m)
@@ -95,6 +95,6 @@ class Path:
 
 
 def _first(wrong: Sequence[bool] | NDArray[np.bool_]) -> int:
-    """Return the number of the first invalid point, counted from 1, or 0."""
+    """Return the number of the first invalid point, counted from 1, or 0 if all are valid."""
     found = np.flatnonzero(wrong)
     return int(found[0]) + 1 if found.size else 0

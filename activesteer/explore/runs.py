@@ -140,7 +140,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _gain(key: str, declared: Declared) -> Slider | None:
-    """Return the slider of a gain, from zero to a multiple of its value, None if it is not a number."""
+    """Return the slider of a gain, from zero to a multiple of its value, or None if it is not a number."""
     if not _is_number(declared.default):
         return None
     tables, _, name = key.rpartition(".")
@@ -416,7 +416,7 @@ _SPEED_MPS: Final = 20.0
 
 
 def slip_limit_deg(scenario: Scenario, mu: float) -> float | None:
-    """Return the slip angle of the largest side force of a rear tyre under its static load [deg], None if flat."""
+    """Return the slip angle of the largest side force of a rear tyre at static load [deg], or None for a flat curve."""
     tyre, load_N = scenario.car.tyres[1], scenario.car.config.single_track.wheel_loads_N[1]
     angles_deg = np.arange(0.5, _LARGEST_SLIP_DEG, 0.1)
     friction = mu / tyre.conventions.reference_friction

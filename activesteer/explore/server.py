@@ -153,7 +153,7 @@ class ExploreServer:
         return HTMLResponse(self._report)
 
     async def _talk(self, page: WebSocket) -> None:
-        """Pass messages of the page to the worker, until a second page takes its place."""
+        """Pass messages of the page to the worker, until a second page replaces the first."""
         if page.headers.get("origin") not in (f"http://{self._host}", f"http://localhost:{self.port}"):
             await page.close(1008)
             return

@@ -41,7 +41,7 @@ class _Worker:
         self._reports = Path(tempfile.mkdtemp(prefix="activesteer-"))
 
     def run(self) -> None:
-        """Answer messages, and drive in real time while a drive is on."""
+        """Answer messages, and advance the current drive in real time."""
         self._send(Reply({"kind": "ready", **self._folder.names(), "titles": titles()}))
         try:
             while True:

@@ -1,4 +1,4 @@
-"""Base of all manoeuvres: kinds, speed, road, duration, setpoints, and the files that they name."""
+"""Base of all manoeuvres: kinds, speed, road, duration, setpoints and input files."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Maneuver(ABC):
         return None
 
     def sequence(self) -> Any:
-        """Return the object that follows the car through the phases of a run, None without phases."""
+        """Return the object that follows the car through the phases of a run, or None without phases."""
         return None
 
     @property

@@ -190,7 +190,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
         return np.interp(path.s_m, at * (path.length_m / at[-1]), values)
 
     def sequence(self) -> PathSpeed | None:
-        """Return the sequence that follows the speeds along the path, None without speeds."""
+        """Return the sequence that follows the speeds along the path, or None without speeds."""
         path = self.course.path
         speeds_mps = self._along(path, self.path.speed_mps)
         return None if speeds_mps is None else PathSpeed(self, path, speeds_mps)

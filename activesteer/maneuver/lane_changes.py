@@ -269,7 +269,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
     """Width of the vehicle, for which the lanes are laid out [m]. Default: the width in the vehicle file."""
 
     def setpoint(self, time_s: float) -> Setpoint:
-        """Return the path and the speed, without throttle if released."""
+        """Return the path and the speed, which is not held after the release of the throttle."""
         return self._setpoint if time_s < self._throttle_off_s else self._coasting
 
     @cached_property

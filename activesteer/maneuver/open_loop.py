@@ -229,7 +229,7 @@ class OpenLoop(Maneuver, kind="open_loop"):
         return new_message(Setpoint, (angle, speed, pedal, drives, None, rack, None, None, applied))
 
     def settling_setpoint(self) -> Setpoint:
-        """Return the setpoint of the start without wheel torques, in which the car may hold its speed."""
+        """Return the initial setpoint without wheel torques. The car may hold its speed."""
         setpoint = self.setpoint(0.0)
         if self.wheel_torques is None:
             return setpoint

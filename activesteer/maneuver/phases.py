@@ -141,7 +141,7 @@ class Phase:
 
 @dataclass(frozen=True, kw_only=True)
 class Phases(Maneuver, kind="phases"):
-    """Phases that follow each other, the last one to the end of the run."""
+    """Successive phases, the last of which lasts until the end of the run."""
 
     phases: tuple[Phase, ...]
     """The phases."""

@@ -316,7 +316,7 @@ def _value(vehicle: str, key: str, source: Source, where: tuple[str, ...], overr
 
 
 def measured_folder(name: str) -> Path:
-    """Return a folder of measured runs, by the name of a car of the package or by its path."""
+    """Find a folder of measured runs by its path or by the name of a car of the package."""
     folder = _folder(name)
     if not is_folder(folder):
         known = [file.parent.name for file in (models_dir() / "reference").glob(f"*/{NAME}")]

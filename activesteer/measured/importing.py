@@ -182,7 +182,7 @@ def _found(name: str, files: _Files) -> tuple[Column, Path]:
 
 
 def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> dict[str, _Source]:
-    """Return the sources of channels from the map."""
+    """Return the source of each channel that the map names."""
     sources = {}
     for name, given in chosen.channels.items():
         if name not in table and (channel := field_in_unit(name, table)[0]) is not None:
@@ -195,7 +195,7 @@ def _mapped(chosen: MeasurementMap, files: _Files, table: Collection[str]) -> di
 
 
 def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[str, _Source]:
-    """Return the sources of channels from the names of columns."""
+    """Return the source of each channel that a column name identifies."""
     every = [(path, column) for path, columns in files.items() for column in columns]
     names = {column.name for _, column in every}
     channels = [*table, "brake_pedal"]
@@ -252,7 +252,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
 
 
 def known_time_unit(name: str) -> str:
-    """Return the unit in the name of a time column, s without one."""
+    """Return the unit in the name of a time column, or s if there is none."""
     ending = name.rstrip("])").replace("[", " ").replace("(", " ").replace("_", " ").split()
     return ending[-1] if len(ending) > 1 and ending[-1] in ("ms", "us", "s") else "s"
 

@@ -42,12 +42,12 @@ def by_channel(
 
 
 def written_unit(unit: str) -> Unit | None:
-    """Return a unit from its spelling in a file, None if unknown."""
+    """Return a unit from its spelling in a file, or None if unknown."""
     return find_unit(unit.strip().strip("[]()").strip().replace("**", "^"), any_case=True)
 
 
 def bracketed(name: str) -> tuple[str, str]:
-    """Split a name and the string in brackets behind it, empty without brackets."""
+    """Split a name and the string in brackets behind it, or an empty string."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     return (found[1], found[2]) if found else (name, "")
 
@@ -201,7 +201,7 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
 
 
 def _alike(one: Array, other: Array) -> float:
-    """Return the cosine between two signals, 0 if one of them is zero."""
+    """Return the cosine between two signals, or 0 if one of them is zero."""
     size = math.sqrt(float(one @ one) * float(other @ other))
     return float(one @ other) / size if size > 0.0 else 0.0
 
@@ -301,7 +301,7 @@ def at_sensor(run: Recording) -> Recording:
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """Return the poses of a car along the path for replay, None without a path."""
+    """Return the poses of a car along the path for replay, or None without a path."""
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import

@@ -119,7 +119,7 @@ _ADDRESSES: Final[dict[Any, int]] = {}
 
 
 def address_of(call: Any) -> int:
-    """Return the address of a `compiled_call` for `call_at`, 0 if numba is switched off."""
+    """Return the address of a `compiled_call` for `call_at`, or 0 if numba is switched off."""
     return _ADDRESSES.get(call, 0)
 
 

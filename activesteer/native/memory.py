@@ -152,7 +152,7 @@ call_law: Final = call_at(types.void, *CALL)
 
 
 def law_address(controller: Any) -> int:
-    """Return the address of the compiled law of a controller, 0 if it has none or its `step` is watched."""
+    """Return the address of the compiled law of a controller, or 0 if it has none or its `step` is watched."""
     if not isinstance(controller, NativeBlock) or controller.is_watched:
         return 0
     kind = type(controller)

@@ -192,7 +192,7 @@ def _formats() -> dict[str, EntryPoint]:
 
 
 def format_of(given: Any) -> EntryPoint | None:
-    """Return the format of a block given as a file, None for others."""
+    """Return the format of a block given as a file, or None for others."""
     if not isinstance(given, (str, os.PathLike)):
         return None
     name, dot, ending = os.fspath(given).partition("?")[0].lower().rpartition(".")

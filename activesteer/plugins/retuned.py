@@ -93,7 +93,7 @@ def same(one: Any, other: Any, seen: frozenset[tuple[int, int]] = frozenset()) -
 
 
 def _parts(value: Any) -> Mapping[Any, Any] | None:
-    """Return the members of a container or an object, None for a simple value."""
+    """Return the members of a container or an object, or None for a simple value."""
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple | deque):

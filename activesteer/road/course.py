@@ -162,7 +162,7 @@ class Footprint(NamedTuple):
 
 
 def footprint_of(metadata: Mapping[str, Any]) -> Footprint | None:
-    """Return the dimensions of the car of a recorded run, None if not recorded."""
+    """Return the dimensions of the car of a recorded run, or None if not recorded."""
     table = metadata.get("car")
     return None if table is None else Footprint.from_table(table)
 

@@ -242,7 +242,7 @@ def _places(head: dict[str, float], names: list[str]) -> Array:
 
 
 def _channel(along: Mapping[str, Array], name: str, constant: float, rows: int) -> Array:
-    """Return slope or banking of each row, 0 for missing values."""
+    """Return slope or banking of each row, with 0 for missing values."""
     return np.nan_to_num(along[name]) if name in along else np.full(rows, constant)
 
 
@@ -278,7 +278,7 @@ def _evenly(places: Array, heights: Array) -> tuple[Array, float, float]:
 
 
 def _line(turn_rad: Array, step_m: float) -> Path | None:
-    """Return the reference line relative to the first heading, None if it is straight."""
+    """Return the reference line relative to the first heading, or None if it is straight."""
     if np.abs(turn_rad).max() < 1e-9:
         return None
     x, y = (np.concatenate([[0.0], np.cumsum(step_m * function(turn_rad))]) for function in (np.cos, np.sin))

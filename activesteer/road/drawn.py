@@ -78,7 +78,7 @@ def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
 
 
 def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
-    """Return the surface of a recorded run, None for a plane road."""
+    """Return the surface of a recorded run, or None for a plane road."""
     if "surface" not in metadata:
         return None
     table = table_of(metadata["surface"], "surface")

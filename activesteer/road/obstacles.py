@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
 
 def summed(fine: Grid, other: Grid) -> Grid:
-    """Return the sum of two grids on the steps of the first one, constant beyond their edges."""
+    """Return the sum of two grids at the steps of the first, each grid constant beyond its edges."""
     first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
     last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
     s = fine.s_m + fine.step_s_m * np.arange(first, last)

@@ -103,7 +103,7 @@ class Area(NamedTuple):
     slope_1pm: float = 0.0
 
     def clipped(self, start_m: float, end_m: float, right_m: float, left_m: float) -> Area | None:
-        """Return the intersection with another rectangle [m], None if empty."""
+        """Return the intersection with another rectangle [m], or None if empty."""
         start, end = max(self.start_m, start_m), min(self.end_m, end_m)
         right, left = max(self.right_m, right_m), min(self.left_m, left_m)
         if not (start < end and right < left):
@@ -236,7 +236,7 @@ class Road:
         return LaidRoad(*values, path=course.path)
 
     def grid(self) -> Grid | None:
-        """Return the heights of the surface without obstacles and banking, None if flat."""
+        """Return the heights of the surface without obstacles and banking, or None if flat."""
         if self.crg_data:
             return unpacked(self.crg_data).grid._replace(s_m=self.start_m)
         grids = [part.grid() for part in (self.roughness, self.heights) if part is not None]
@@ -265,7 +265,7 @@ class Road:
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return the areas of other friction within a rectangle of the world as quadrangles [m], later ones on top."""
+        """Return quadrangles [m] of different friction within a rectangle of the world, later ones on top."""
         shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
         return [
             piece
@@ -332,7 +332,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return all areas of other friction as quadrangles along the path, regardless of the rectangle."""
+        """Return all areas of different friction as quadrangles along the path, regardless of the rectangle."""
         path, found = self.path, []
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)

@@ -101,7 +101,7 @@ def _obstacle_at(it, s, d):
 
 @compiled
 def near_obstacles(obstacles, s, d):
-    """Return the range of obstacles near a position, and the rise that they cause in a tyre's reach [m]."""
+    """Return the range of obstacles near a position, and the rise that they cause within a tyre's reach [m]."""
     first, last, highest = obstacles.size, 0, 0.0
     for index in range(obstacles.size):
         it = obstacles[index]
@@ -198,7 +198,7 @@ def height_at(surface, numbers, obstacles, first, last, s, d):
 
 @compiled
 def rise_at(surface, numbers, s):
-    """Return the rise of the grid in a tyre's reach around a position [m]."""
+    """Return the rise of the grid within a tyre's reach around a position [m]."""
     count = int(surface.rises)
     if count == 0:
         return 0.0

@@ -374,7 +374,7 @@ _SPEED_MPS: Final = 20.0
 
 
 def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
-    """Return the properties that estimators may use, None without a table [two_track]."""
+    """Return the properties that estimators may use, or None without a table [two_track]."""
     config, body = car.config, car.config.single_track
     if config.two_track is None:
         return None

@@ -60,7 +60,7 @@ _BUILT_IN: Final = frozenset(field.name for field in fields(ControllerParameters
 
 
 def own_path(key: str) -> tuple[str, str] | None:
-    """Return class and parameter of a key of a user's controller, None for other keys."""
+    """Return class and parameter of a key of a user's controller, or None for other keys."""
     table, _, rest = key.removeprefix("vehicle.").partition(".")
     name, _, parameter = rest.partition(".")
     return (name, parameter) if table == "controllers" and name and name not in _BUILT_IN else None

@@ -175,7 +175,7 @@ class SensorBlock:
             own[LINE:] = value
 
     def say(self, measurement: Measurement) -> None:
-        """Replace the readings until the next step, for example with those of a faulty sensor."""
+        """Replace the readings until the next step, for example with the readings of a faulty sensor."""
         parts = (part if isinstance(part, tuple) else (part,) for part in measurement[1:])
         self.outputs[:] = [number for part in parts for number in part]
 

@@ -168,7 +168,7 @@ class Batch(Copyable):
 
     @property
     def step_count(self) -> NDArray[np.intp]:
-        """Number of steps that each car has made."""
+        """Number of steps that each car has driven."""
         return self._records["step"].copy()
 
     @property

@@ -306,7 +306,7 @@ def fitted(body: Body, tests: list[dict[str, float]]) -> SingleTrackParameters:
 
 
 def searched_angle(scenario: Scenario, timestep_s: float = DEFAULT_TIMESTEP_S) -> float | None:
-    """Return the steering wheel angle from the search of the manoeuvre [rad], None without a search."""
+    """Return the steering wheel angle from the search of the manoeuvre [rad], or None without a search."""
     # The search drives the car without faults and with ideal sensors, so that the input does not depend on them.
     search = replace(scenario.maneuver, fault=()).search
     if search is None:

@@ -54,7 +54,7 @@ class Link(Protocol):
         """Set the function that checks and completes commands."""
 
     def commands(self) -> Given:
-        """Return the commands for the next step, None where the run's own block decides."""
+        """Return the commands for the next step, with None where the run's own block decides."""
         ...
 
     def tell(self, step: int, measurement: Measurement, motion: Motion) -> None:

@@ -183,7 +183,7 @@ def _roll_arm(slip: Array, unrolled: Array, roll: Array, rate_radpm: Array, per_
 
 
 def _pitch_gradient(recording: RecordingLike) -> float:
-    """Return the pitch angle over deceleration [rad/(m/s2)]."""
+    """Return the pitch angle per deceleration [rad/(m/s2)]."""
     pitch, braking = _channel(recording, "pitch_rad"), recording.time_s >= _BRAKING_S[0]
     return max(0.0, float((pitch[braking].mean() - pitch[0]) / -_channel(recording, "ax_mps2")[braking].mean()))
 

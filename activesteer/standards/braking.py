@@ -64,7 +64,7 @@ _SPLIT_CHANNELS: Final = ("yaw_rate_radps", "yaw_rad", "y_m", "speed_mps")
 
 
 def after_one_second(run: StandardRun, begin_s: float) -> dict[str, float]:
-    """Return the motion of the car 1 s after the start of braking, nan if the run ends before."""
+    """Return the motion of the car 1 s after the start of braking, or nan if the run ends before."""
     then_s = begin_s + AFTER_S
     return {
         "yaw_rate_after_1000ms_radps": run.at("yaw_rate_radps", then_s),

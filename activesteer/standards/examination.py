@@ -148,7 +148,7 @@ def examination_page(result: Examination) -> Page:
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
-    """Return overlaid plots of several controllers by title, None for a single controller.
+    """Return overlaid plots of several controllers by title, or None for a single controller.
 
     A controller has one colour. Of two curves of a panel, such as the turns to the left and to the right, the first is
     wide and pale, the second thin. Pictures with more curves stay with their controller.

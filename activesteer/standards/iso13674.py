@@ -78,7 +78,7 @@ def _crossings(x: Array, y: Array, sign: float) -> Array:
 
 
 def slope(x: Array, y: Array) -> float:
-    """Return the slope of the line through points, nan for fewer than three points."""
+    """Return the slope of the line through points, or nan for fewer than three points."""
     return float(np.polynomial.Polynomial.fit(x, y, 1).convert().coef[1]) if len(x) > 2 else math.nan
 
 

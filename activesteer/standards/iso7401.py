@@ -130,7 +130,7 @@ def _sweep_responses(sweep: StandardRun) -> Responses:
 
 
 def _random_responses(runs: list[StandardRun]) -> Responses:
-    """Return the responses from the finished runs with random steering, empty without such a run."""
+    """Return the responses from the finished runs with random steering, empty if there are none."""
     driven = [run for run in runs if run.channels]
     if not driven:
         return {}
@@ -138,7 +138,7 @@ def _random_responses(runs: list[StandardRun]) -> Responses:
 
 
 def weak_ranges(found: FrequencyResponse) -> str:
-    """Describe the frequency ranges with a coherence below `COHERENCE`, empty without any."""
+    """Describe the frequency ranges with a coherence below `COHERENCE`, empty if there are none."""
     weak = np.concatenate([[False], found.coherence < COHERENCE, [False]])
     edges = np.flatnonzero(np.diff(weak.astype(int)))
     lines = found.frequency_Hz

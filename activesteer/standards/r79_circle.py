@@ -63,7 +63,7 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Return the time until a radius is reached and the largest rim force until then, nan if not reached."""
+    """Return the time until a radius is reached and the largest rim force until then, or nan if not reached."""
 
     time_s: float
     effort_N: float
@@ -396,7 +396,7 @@ class _FaultRuns:
 
 
 def _judged(runs: _FaultRuns, fault: Fault) -> dict[str, Any]:
-    """Return the results of a fault, nan for an incomplete run."""
+    """Return the results of a fault, with nan for an incomplete run."""
     try:
         fixed = runs.hands_fixed(fault)
         driven = runs.again(fault)
@@ -435,7 +435,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the longest duration of a fault that keeps the limits [s], by bisection.
+    """Find the longest duration of a fault within the limits [s], by bisection.
 
     The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
     """

@@ -58,7 +58,7 @@ class StandardRun:
         return self.channels[channel]
 
     def at(self, channel: str, time_s: float) -> float:
-        """Return the interpolated value of a channel at a time, nan after the end of the run."""
+        """Return the interpolated value of a channel at a time, or nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
         return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
 
@@ -68,7 +68,7 @@ class StandardRun:
         return {**self.case, **(dict(self.metrics) if not self.error else {"error": self.error})}
 
     def metric(self, name: str) -> float:
-        """Return a metric, nan if the run does not have it."""
+        """Return a metric, or nan if the run does not have it."""
         return self.metrics.get(name, math.nan)
 
     def over_time(self, channel: str, *, begin_s: float = 0.0, **words: Any) -> Curve:
@@ -159,7 +159,7 @@ class Findings:
 
     @property
     def passed(self) -> bool | None:
-        """True if the car keeps the limits, None for a method without limits."""
+        """True if the car keeps the limits, or None for a method without limits."""
         return self.values.get("pass")
 
 

@@ -259,7 +259,7 @@ def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
 
 
 def _memory_MB() -> float:
-    """Return the memory of this process [MB], 0 if unknown."""
+    """Return the memory of this process [MB], or 0 if unknown."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

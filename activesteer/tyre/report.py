@@ -94,7 +94,7 @@ def _over_load(params: TyreParameters, loads: np.ndarray) -> dict[str, list[floa
 
 
 def size(params: TyreParameters) -> str | None:
-    """Return the size designation, such as 205/55 R16, None without dimensions in the file."""
+    """Return the size designation, such as 205/55 R16, or None if the file has no dimensions."""
     if not {"WIDTH", "RIM_RADIUS", "ASPECT_RATIO"} <= params.given.keys():
         return None
     rim = 2.0 * params["RIM_RADIUS"] / _INCH_M

@@ -145,7 +145,7 @@ class Motors:
         return [motor for name, motor in self if name == axle or name in AXLES[axle]]
 
     def at(self, corner: str) -> tuple[str, Motor] | None:
-        """Return position and motor of the drive of a wheel, None without a motor."""
+        """Return position and motor of the drive of a wheel, or None without a motor."""
         return next(((name, motor) for name, motor in self if name == corner or corner in AXLES.get(name, ())), None)
 
     def inertia_kgm2(self, corner: str) -> float:

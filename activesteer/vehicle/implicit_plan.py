@@ -308,7 +308,7 @@ def drop_metric(model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def _sensed_body(model: mujoco.MjModel) -> int:
-    """Return the only body with a sensed acceleration, 0 without one."""
+    """Return the only body with a sensed acceleration, or 0 without one."""
     late = np.flatnonzero(model.sensor_needstage == int(mujoco.mjtStage.mjSTAGE_ACC))
     if (model.sensor_type[late] != int(mujoco.mjtSensor.mjSENS_ACCELEROMETER)).any():
         return 0

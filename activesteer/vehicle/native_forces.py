@@ -52,7 +52,7 @@ curve."""
 
 @inlined
 def _our_block(model, m_count, m_numbers):
-    """Return the address of the force block of a model of this package, 0 for other models."""
+    """Return the address of the force block of a model of this package, or 0 for other models."""
     count = word(model + m_count)
     address = word(model + m_numbers)
     numbers = carray(f64_pointer(address), (count,))

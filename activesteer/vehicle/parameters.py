@@ -142,14 +142,14 @@ class Powertrain:
 
     @property
     def wheel_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the drive torque at each wheel [-], order of `CORNERS`."""
+        """Fraction of the drive torque at each wheel [-], in the order of `CORNERS`."""
         front, rear = 0.5 * self.front_fraction, 0.5 * (1.0 - self.front_fraction)
         return front, front, rear, rear
 
 
 @dataclass(frozen=True)
 class Steering:
-    """Overall ratio of steering wheel angle to road wheel angle, for driver and controllers."""
+    """Steering ratio, lock angle and power assist."""
 
     ratio: Positive
     """Steering wheel angle over mean road-wheel angle around straight ahead [-]."""
@@ -327,7 +327,7 @@ class VehicleParameters:
 
     @property
     def engine_fractions(self) -> tuple[float, float, float, float]:
-        """Fraction of the engine's torque at each wheel [-], order of `CORNERS`."""
+        """Fraction of the engine's torque at each wheel [-], in the order of `CORNERS`."""
         share = self.engine_share or 1.0
         front, _, rear, _ = self.powertrain.wheel_fractions
         front, rear = (0.0 if self.motors.on(ax) else part / share for ax, part in (("front", front), ("rear", rear)))
@@ -395,7 +395,7 @@ def engine_speed(fractions: Sequence[float], wheel_speeds_radps: Sequence[float]
 
 
 class PowertrainLimits:
-    """Drive for the driver: torque limits at the current speed of the wheels.
+    """Powertrain as the driver knows it: torque limits at the current wheel speed.
 
     Attributes:
         fractions: Fraction of the torque that each wheel gets.

@@ -74,7 +74,7 @@ def move_by(model: mujoco.MjModel, data: mujoco.MjData, dofs: list[int] | NDArra
 def slopes(
     model: mujoco.MjModel, data: mujoco.MjData, dofs: Iterable[int], present: Array, value: Callable[[], Array]
 ) -> Array:
-    """Return finite differences of a vector by each degree of freedom, shape (present, dofs)."""
+    """Return finite differences of a vector with respect to each degree of freedom, shape (present, dofs)."""
     start, columns = data.qpos.copy(), []
     for dof in dofs:
         move_by(model, data, [dof], _DIFFERENCE)

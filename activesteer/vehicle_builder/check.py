@@ -184,7 +184,7 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
 
 
 def _riding(result: KcResult) -> Iterator[Finding]:
-    """Compare the metrics of the rig with the usual ones of passenger cars."""
+    """Compare the metrics of the rig with the usual values for passenger cars."""
     yield from _metrics(result, "riding")
     front, rear = result["front", "ride_frequency"], result["rear", "ride_frequency"]
     yield judged("ride_ratio", rear / front)
@@ -453,7 +453,7 @@ def _height(vehicle: Vehicle) -> Iterator[Finding]:
 
 
 def _stays(vehicle: Vehicle) -> Finding:
-    """Check the stability during half a second at rest."""
+    """Check that the car stands still for half a second."""
     try:
         with engine_warnings_held():
             for _ in range(_STEPS):

@@ -362,7 +362,7 @@ def _anti_roll_bar(axle: str, table: AxleTable, measured: MeasuredAxle | None, h
 
 
 def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
-    """Return lower and upper point of the rear steering axis."""
+    """Return the lower and the upper point of the rear steering axis."""
     lower, upper = table.rear_steering.axis_lower, table.rear_steering.axis_upper
     if lower is not None and upper is not None:
         return np.array(lower), np.array(upper)

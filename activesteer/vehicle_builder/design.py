@@ -27,7 +27,7 @@ from activesteer.vehicle_builder.table import AxleTable, CarTable
 
 @dataclass(frozen=True)
 class Assumption:
-    """Assumption: a value that the table does not give."""
+    """A value that the table does not give."""
 
     key: str
     value: str

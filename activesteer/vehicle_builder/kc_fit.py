@@ -130,7 +130,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion without the compliance in series, shape (n, 5), nan if not measured."""
+    """Return the motion without the compliance in series, shape (n, 5), with nan where not measured."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 
@@ -161,7 +161,7 @@ _DIGITS: Final = 7
 
 @dataclass(frozen=True)
 class MeasuredAxle:
-    """Measurements of an axle for one wheel, None for missing measurements."""
+    """Measurements of an axle for one wheel, with None for missing measurements."""
 
     curves: AxleCurves  # measured curves, and the stiffness
     wheel_load_N: tuple[float, ...] | None  # over `curves.travel_m`, relative to the standing car
@@ -268,7 +268,7 @@ def _over_travel(
 def _over_rack(
     samples: Samples, radius_m: float, over_travel: dict[str, tuple[float, ...]], travel: Array, rough: dict[str, float]
 ) -> dict[str, tuple[float, ...]]:
-    """Return the curves over the rack, less the effect of the wheel travel during the sweep."""
+    """Return the curves versus rack travel, less the effect of the wheel travel during the sweep."""
     rack = np.round(np.linspace(samples.x.min(), samples.x.max(), _POINTS), 6)
     lifted = samples.moved("travel")
 
@@ -355,7 +355,7 @@ def _anti_roll_bar(tests: dict[str, Samples], travel: Array, parallel: Array | N
 
 
 def _rack_lift(tests: dict[str, Samples]) -> float:
-    """Return the rack lift from the change of wheel load over steering, 0 if not measured."""
+    """Return the rack lift from the change of wheel load with steering, or 0 if not measured."""
     steered, opposite = tests.get("steering"), tests.get("opposite_travel")
     if steered is None or opposite is None:
         return 0.0

@@ -59,7 +59,7 @@ class Samples:
     file: str
 
     def moved(self, name: str) -> Array | None:
-        """Return a channel relative to x = 0, None if not measured."""
+        """Return a channel relative to x = 0, or None if not measured."""
         if name not in self.channels:
             return None
         return self.channels[name] - smoothed(self.x, self.channels[name], np.zeros(1))

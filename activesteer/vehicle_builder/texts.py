@@ -173,7 +173,7 @@ class _Corner(NamedTuple):
     side: float  # 1 on the left, -1 on the right
 
     def at(self, point: Array) -> str:
-        """Mirror a point of the left side to a side."""
+        """Return a point of the left side as text, mirrored to this side."""
         return vec((point[0], self.side * point[1], point[2]))
 
 

@@ -109,7 +109,7 @@ def match_travel(axles: tuple[Axle, ...], trimmed: dict[str, TrimmedAxle], held:
 
 
 def match_steering(axle: Axle, trimmed: TrimmedAxle, held: HeldCar, pinion_m: float) -> float:
-    """Correct the curves over the rack, and return the largest correction [m, rad]."""
+    """Correct the curves versus rack travel, and return the largest correction [m, rad]."""
     measured, curves = _measured_curves(axle), trimmed.curves
     assert curves is not None
     rack = np.array(measured.rack_m)
@@ -304,7 +304,7 @@ def tyre_rate_Npm(tyre: TyreParameters, load_N: float) -> float:
 
 
 def _target_rate(axle: Axle, load_N: float, sprung_kg: float) -> float | None:
-    """Return the wheel rate, None if the table gives the spring rate."""
+    """Return the wheel rate, or None if the table gives the spring rate."""
     if axle.measured is not None and axle.measured.wheel_load_N is not None:
         return None
     if axle.table.wheel_rate_Npm is not None or axle.ride_frequency_Hz is None:

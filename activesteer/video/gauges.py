@@ -47,7 +47,7 @@ class Dials(NamedTuple):
     colour: str  # colour of its car, `#rrggbb`
 
     def value(self, channel: str, time_s: float) -> float:
-        """Return a channel at a time, nan if unknown."""
+        """Return a channel at a time, or nan if unknown."""
         if channel not in self.recording or (channel == "sideslip_rad" and not self._moves(time_s)):
             return math.nan
         return float(np.interp(time_s, self.recording.time_s, self.recording[channel]))

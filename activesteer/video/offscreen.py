@@ -51,7 +51,7 @@ def backend() -> str:
 
 
 def _problem_with(name: str) -> str | None:
-    """Return the reason why a backend does not work, None if it works."""
+    """Return the reason why a backend does not work, or None if it works."""
     environment = {key: value for key, value in os.environ.items() if key != "PYOPENGL_PLATFORM"} | {"MUJOCO_GL": name}
     try:
         tried = subprocess.run(

@@ -112,7 +112,7 @@ def thinned(values: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def plain(axis: Axes, title: str = "") -> None:
-    """Set grid, spines and size of text of an axis."""
+    """Set the grid, spines and text size of an axis."""
     if title:
         axis.set_ylabel(title)
     plain_axis(axis)
@@ -305,7 +305,7 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
-    """Shade the times when a wheel is on another friction than at the start, once for each run."""
+    """Shade the times when a wheel's friction differs from its initial friction, once for each run."""
     for curve in drawn:
         try:
             mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])

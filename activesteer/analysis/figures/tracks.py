@@ -104,7 +104,7 @@ def _shade_body(axis: Axes, curve: DrawnRun) -> None:
 
 
 def _draw_friction(axis: Axes, curve: DrawnRun) -> None:
-    """Draw the patches of another friction, behind everything else."""
+    """Draw the patches with a different friction, behind everything else."""
     from matplotlib.patches import Polygon  # noqa: PLC0415 - an extra, and slow to import
 
     road = road_of(curve.recording.metadata)

@@ -32,7 +32,7 @@ _NEEDED: Final = (DESCRIPTION, "resources/", *BINARIES)
 
 
 class Archive:
-    """An FMU file with the digest `key`, unpacked at first use and deleted at the end of the process."""
+    """An FMU file with the digest `key`. The end of the process deletes the unpacked copy."""
 
     def __init__(self, path: Path, kind: Kind) -> None:
         """Read and check the archive without unpacking it."""
@@ -240,7 +240,7 @@ def _library(archive: Archive, identifier: str, kind: Kind) -> str:
 
 
 def _declared_unit(name: str | None, base: Any) -> Unit | None:
-    """Return a unit of an FMU from its base unit, None for an unknown unit."""
+    """Return a unit of an FMU from its base unit, or None for an unknown unit."""
     if name is None or base is None:
         return find_unit(name) if name else None
     others = any(getattr(base, other) for other in ("A", "K", "mol", "cd"))

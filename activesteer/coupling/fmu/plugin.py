@@ -57,7 +57,7 @@ class Signals(NamedTuple):
     words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:
-        """Return the full name of a signal given with or without its unit, None for an unknown name."""
+        """Return the full name of a signal given with or without its unit, or None for an unknown name."""
         known = (other for other in self.places if other == name or split_ending(other)[0] == name)
         return next(known, None)
 

@@ -183,7 +183,7 @@ class HeldCar:
         )
 
     def _command(self, case: Case) -> None:
-        """Command the servos, and start at their targets, because far from them they would saturate."""
+        """Command the servos, and start at their targets. Far from its target, a servo would saturate."""
         model, data = self.model, self.data
         commands = [(self._steering_wheel, case.steering_wheel_rad)]
         commands += [(actuator, case.rear_steer_rad) for actuator in self._rear]

@@ -320,7 +320,7 @@ def _bushes_Npmm(axle: Axle) -> Array:
 
 
 def _top_mount_Npmm(axle: Axle, direction: str) -> float:
-    """Stiffness of the left top mount, nan for a rigid one [N/mm]."""
+    """Stiffness of the left top mount, or nan for a rigid one [N/mm]."""
     model = axle.measured.vehicle.model
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{axle.name[0]}l_mount_{direction}")
     return 1e-3 * float(model.tendon_stiffness[tendon]) if tendon >= 0 else math.nan

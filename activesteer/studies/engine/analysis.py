@@ -155,7 +155,7 @@ def _others(factor: Factor, number: int, point: Point) -> Iterator[Point]:
 
 
 def _driven(plan: Plan, place: Place, point: Point) -> str | None:
-    """Return the metrics of a run with these values, None if it is incomplete."""
+    """Return the metrics of a run with these values, or None if it is incomplete."""
     study = replace(plan.settings.study, recordings="none", curves=(), claims=False)
     settings = replace(plan.settings, study=study, folder=None)
     # A table may hold a whole number of the study as a float.

@@ -49,7 +49,7 @@ class FactorValues:
                     raise study.source.fail(place, f"is not another range; {nearest_names(other, ranges)}", other)
 
     def overrides(self, maneuver: int, vehicle: int, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the overrides of a run, None for a key that keeps the value of the files."""
+        """Return the overrides of a run, with None for a key that keeps the value of the files."""
         label = label_of(self.study.maneuvers[maneuver])
         found = {}
         # In the order of the file, in which a factor follows the one to which it is relative.

@@ -68,12 +68,12 @@ class Factor(FactorTable):
 
     @property
     def low(self) -> float:
-        """Return the lower end of a range, 0 without a range."""
+        """Return the lower end of a range, or 0 without a range."""
         return self._ends[0]
 
     @property
     def high(self) -> float:
-        """Return the upper end of a range, 0 without a range."""
+        """Return the upper end of a range, or 0 without a range."""
         return self._ends[1]
 
     @property

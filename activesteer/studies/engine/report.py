@@ -153,7 +153,7 @@ def _shown_rows(table: pa.Table) -> Places:
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
-    """Return the values of a factor, None in manoeuvres in which it does not vary."""
+    """Return the values of a factor, with None in manoeuvres in which it does not vary."""
     named = [factor.maneuvers for factor in study.factors if factor.key == key]
     values, maneuvers = rows[key].to_pylist(), rows["maneuver"].to_pylist()
     if not all(named):
@@ -345,7 +345,7 @@ def draw_tuning(found: Tuning, folder: Path) -> list[Path]:
 
 
 def _front(found: Tuning) -> Panel:
-    """Return the figure of two objectives, of one objective over the sets, or of statements over implausibility."""
+    """Return the figure of two objectives, of one objective over the sets, or of statements versus implausibility."""
     names = list(found.trials[0].objectives)
     x, y = names[:2] if len(names) > 1 else ("set", *names, "statements that hold")[:2]
     if found.goal is Goal.SATISFY:
@@ -403,7 +403,7 @@ def _violations(found: Tuning) -> Picture:
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation, 0 for a constant."""
+    """Return Spearman's rank correlation, or 0 for a constant."""
     if len(x) < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0
     return float(np.corrcoef(rankdata(x), rankdata(y))[0, 1])

@@ -59,7 +59,7 @@ class Trial:
 
     @property
     def allowed(self) -> bool:
-        """True if all constraints are kept."""
+        """True if all constraints are satisfied."""
         return all(margin >= 0.0 for margin in self.constraints.values())
 
 
@@ -155,7 +155,7 @@ def tune(
 
 
 def read_tuning(study_file: FileOrTable, folder: str | os.PathLike[str]) -> Tuning:
-    """Return the progress of the search in a folder, also of another version of the package."""
+    """Return the progress of the search in a folder, even if another version of the package drove it."""
     (search,) = _searches(read_study(study_file, TABLE), Path(folder), None, None)
     return search.result(search.stored())
 

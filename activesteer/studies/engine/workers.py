@@ -229,7 +229,7 @@ def connected(scheduler: str) -> Iterator[Any]:
 
 
 def _compare_versions(found: dict[str, Any]) -> None:
-    """Check that client, scheduler and workers have the same versions, also of activesteer."""
+    """Check that client, scheduler and workers have the same versions, including activesteer."""
     here = found["client"]
     others = {"the scheduler": found["scheduler"]} | {f"worker {key}": value for key, value in found["workers"].items()}
     for who, theirs in others.items():

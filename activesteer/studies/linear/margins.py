@@ -80,7 +80,7 @@ Response = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop, nan for a margin that does not exist."""
+    """Margins of one loop, with nan for a margin that does not exist."""
 
     gain_dB: float  # smallest factor on the gain, up or down, that makes the loop marginal [dB]
     phase_rad: float  # smallest phase that makes it marginal [rad]
@@ -108,7 +108,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """Return the smallest of each margin, none if a loop is unstable."""
+    """Return the smallest of each margin, or the margins of an unstable loop if there is one."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -290,7 +290,7 @@ def _rolling(scenario: Scenario) -> Measurement:
 
 
 def _fully_active(setup: ControllerSetup) -> ControllerSetup:
-    """Return the setup with correctors without a dead band."""
+    """Return the setup without the dead bands of the correctors."""
     gains = setup.gains
     acting = {
         name: replace(system, corrector=replace(system.corrector, deadband_start_radps=0.0, deadband_end_radps=0.0))

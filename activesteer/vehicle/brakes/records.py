@@ -143,7 +143,7 @@ class Brakes:
 
     @property
     def torques_Nm(self) -> tuple[float, float, float, float]:
-        """Torques of the wheels at full pedal [N m], order of `CORNERS`."""
+        """Torques of the wheels at full pedal [N m], in the order of `CORNERS`."""
         return self.front_torque_Nm, self.front_torque_Nm, self.rear_torque_Nm, self.rear_torque_Nm
 
 

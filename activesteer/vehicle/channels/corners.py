@@ -88,7 +88,7 @@ def _against_chassis(height: Column, design_m: float, axis: tuple[Column, ...]) 
 
 
 def design_heights_m(model: mujoco.MjModel) -> list[float]:
-    """Return the design heights of the wheel centres in vehicle axes [m], order of `CORNERS`."""
+    """Return the design heights of the wheel centres in vehicle axes [m], in the order of `CORNERS`."""
     at_rest = mujoco.MjData(model)
     mujoco.mj_kinematics(model, at_rest)
     chassis = model.body("chassis").id
@@ -309,7 +309,7 @@ def link_signals(model: mujoco.MjModel) -> Iterator[Signal]:
 
 
 def axial_force(model: mujoco.MjModel, tendon: int) -> AxialForce:
-    """Return the law of a tendon's stiffness."""
+    """Return the coefficients of a tendon's axial force."""
     stiffness = model.tendon_stiffness[tendon], *model.tendon_stiffnesspoly[tendon]
     return AxialForce._make((tendon, *stiffness, model.tendon_damping[tendon], *model.tendon_lengthspring[tendon]))
 
