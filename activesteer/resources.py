@@ -1,6 +1,6 @@
 """Models, manoeuvres and studies of the package, in a checkout or an installation.
 
-In a wheel they are inside the package, in `_data/`; in a checkout they are beside the package.
+In a wheel they are inside the package, in `_data/`; in a checkout they are next to the package.
 """
 
 from __future__ import annotations

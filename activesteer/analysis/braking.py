@@ -1,7 +1,7 @@
 """Metrics of braking straight ahead (ISO 21994, ISO 14512) and in a turn (ISO 7975).
 
 In a turn the reference is the circle of the steady state before the brake. Its radius is speed over yaw rate. Its
-centre lies across the track of the centre of gravity at the beginning of braking.
+centre is across the track of the centre of gravity at the start of braking.
 
 Source: ISO 7975, Passenger cars - Braking in a turn - Open-loop test method.
 """
@@ -34,7 +34,7 @@ def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:
         - `stopping_distance_m`: from there to standstill.
         - `mean_deceleration_mps2`: mean fully developed deceleration, over the distance between 80 and 10 % of the
           initial speed (UN R13-H).
-        - `braking_efficiency`: this deceleration over the one that the tyres' peak friction allows at their loads on
+        - `braking_efficiency`: this deceleration over the value that the tyres' peak friction allows at their loads on
           the same distance, g sum(mu F_z) / sum(F_z); drag counts as braking.
         - `wheel_slip_max`: largest slip of a wheel as a fraction of the car's speed, above 15 km/h; 1 is locked.
         - `brake_pressure_peak_Pa`, and until standstill `yaw_rate_peak_abs_radps`, `lateral_deviation_max_m` from the
@@ -131,11 +131,11 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
         - `braking_begin_time_s`; the steady state before it: `speed_begin_mps`, `ay_begin_mps2`,
           `yaw_rate_begin_radps`, `radius_begin_m`.
         - `mean_deceleration_mps2`: until standstill, release of the pedal, or the end of the run.
-        - `yaw_rate_after_1000ms_radps`: 1 s after the beginning of braking.
+        - `yaw_rate_after_1000ms_radps`: 1 s after the start of braking.
         - `yaw_rate_deviation_after_1000ms_radps`: the same less the yaw rate that keeps the car on the circle at its
           present speed, in the direction of the turn; above 0 the car turns in.
         - `path_deviation_after_1000ms_m`: distance of the centre of gravity from the circle, outwards positive.
-        - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the beginning of braking on; sideslip above
+        - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the start of braking on; sideslip above
           10 km/h.
 
         A value is nan if the run ends before it.
@@ -159,7 +159,7 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
     if not abs(yaw_rate_radps) >= MIN_YAW_RATE_RADPS:
         raise RecordingError(
             f"the recording holds no braking in a turn: the yaw rate before the brake is "
-            f"{math.degrees(yaw_rate_radps):.3g} deg/s, at least {math.degrees(MIN_YAW_RATE_RADPS):.3g} are needed",
+            f"{math.degrees(yaw_rate_radps):.3g} deg/s; at least {math.degrees(MIN_YAW_RATE_RADPS):.3g} are needed",
             value=yaw_rate_radps,
             allowed=MIN_YAW_RATE_RADPS,
         )

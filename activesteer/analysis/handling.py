@@ -134,8 +134,8 @@ def handling_metrics(recording: RecordingLike) -> dict[str, float]:
         - `characteristic_speed_mps`: sqrt(l/EG); nan for a car that does not understeer.
         - `roll_gradient_...`: roll angle, outwards positive. `sideslip_gradient_...`: sideslip angle at the centre of
           gravity, in a left turn.
-        - `front_slip_gradient_...`, `rear_slip_gradient_...`: effective slip angles of the axles, that of the front one
-          with steering and roll steer.
+        - `front_slip_gradient_...`, `rear_slip_gradient_...`: effective slip angles of the axles, at the front with
+          steering and roll steer.
         - At constant speed `yaw_rate_gain_1ps` and `steering_wheel_gain_mps2prad`: yaw rate and lateral acceleration
           per steering wheel angle.
         - `limit_acceleration_mps2`: largest lateral acceleration; `speed_end_mps`.

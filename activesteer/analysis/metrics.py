@@ -2,8 +2,8 @@
 
 The latter are sizes, energy, ride and rollover.
 
-The seat point lies in the middle of the wheelbase, `SEAT_ASIDE_M` beside the middle of the car, on both sides in turn;
-the worse side counts. Its vertical acceleration is that of the centre of gravity plus that of pitch and roll.
+The seat point is in the middle of the wheelbase, `SEAT_ASIDE_M` from the middle of the car, on both sides in turn; the
+worse side counts. Its vertical acceleration is the sum of heave, pitch and roll.
 
 Source: ISO 2631-1:1997, annex A (frequency weighting W_k: band limits 0.4 and 100 Hz, transition 12.5 Hz, step 2.37 to
 3.35 Hz).

@@ -100,7 +100,7 @@ def _windows(recording: RecordingLike, course: Course) -> tuple[slice, slice, sl
         return nothing, nothing, nothing
     time_s = recording.time_s
     rest_s = float(time_s[-1] - time_s[last])
-    # Half a step of tolerance: the last sample lies one step before the end of the run.
+    # Half a step of tolerance: the last sample is one step before the end of the run.
     if rest_s < AFTER_S - 1.5 * timestep(time_s):
         return slice(0, last), slice(first, last), nothing
     end = int(np.searchsorted(time_s, time_s[last] + AFTER_S))
@@ -114,7 +114,7 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     if course.last_gate_x_m is None:  # such a path may cross itself
         every = max(1, round(_LAP_STEP_S / timestep(recording.time_s)))
         along, deviation = lanes.places_along(x[::every], y[::every], course.path)
-        end_m = course.path.length_m + along[0]  # the front axle starts ahead of the path's beginning
+        end_m = course.path.length_m + along[0]  # the front axle starts ahead of the path's start
         ended = np.flatnonzero(along >= end_m)
         lap["lap_time_s"] = math.nan
         if len(ended) and ended[0] > 0:

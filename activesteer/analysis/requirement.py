@@ -1,4 +1,4 @@
-"""Requirements on runs, with a graded distance: expressions over metrics.
+"""Requirements on runs: comparisons of metrics, with the distance from passing.
 
 An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
 the metric of that run; the manoeuvre may be left out if there is only one. The ending of the name gives the unit: SI

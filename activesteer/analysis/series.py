@@ -126,7 +126,7 @@ def lag(leader: Array, follower: Array, timestep_s: float, longest_s: float) -> 
 def timestep(time_s: Array) -> float:
     """Return the interval between equidistant samples [s]."""
     if len(time_s) < 2:
-        raise RecordingError(f"{len(time_s)} samples are too few to analyse, at least 2 are needed", value=len(time_s))
+        raise RecordingError(f"{len(time_s)} samples are too few to analyse; at least 2 are needed", value=len(time_s))
     steps = np.diff(time_s)
     mean_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
     if mean_s <= 0.0 or float(np.abs(steps - mean_s).max()) > 0.01 * mean_s:
@@ -146,7 +146,7 @@ def step_response(
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal
     never passes 90 %, and all times are nan below the minimum. The peak time is nan if the signal only settles: its
-    largest value lies in the window, or exceeds the steady-state value by less than `PEAK_MARGIN`.
+    largest value is in the window, or exceeds the steady-state value by less than `PEAK_MARGIN`.
 
     Source: ISO 7401, step input: response time, peak response time, overshoot.
     """

@@ -71,7 +71,7 @@ def steering(recording: RecordingLike) -> Steering:
     time_s = recording.time_s
     angle = low_pass(recording["steering_wheel_rad"], timestep(time_s), STEERING_CUT_OFF_Hz)
     if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
-        problem = "the sine with dwell has no beginning: the steering wheel is turned in the first sample"
+        problem = "the sine with dwell has no start: the steering wheel is already turned in the first sample"
         raise RecordingError(problem, value=float(angle[0]))
     straight = zeroing_range(time_s, angle)
     angle -= offset(recording["steering_wheel_rad"], straight)
@@ -79,7 +79,7 @@ def steering(recording: RecordingLike) -> Steering:
     if turned.size == 0:
         raise RecordingError(
             f"the recording holds no sine with dwell: the steering wheel turns by "
-            f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most, more than "
+            f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most; more than "
             f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed",
             value=float(np.abs(angle).max()),
         )
@@ -99,7 +99,7 @@ def steering(recording: RecordingLike) -> Steering:
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
     """Return the times to mark in plots over time, with their labels.
 
-    They are instants of the criterion, phases that begin, or the beginning of braking.
+    They are times of the criterion, starts of phases, or the start of braking.
     """
     if entry(recording, "maneuver", "brake"):
         with suppress(RecordingError):  # a recording of another program
@@ -110,7 +110,7 @@ def marks(recording: RecordingLike) -> list[tuple[float, str]]:
     try:
         completion_s = steering(recording).completion_s
     except RecordingError:
-        # An incomplete run has no such instants, but it can be shown.
+        # An incomplete run has no such times, but it can be shown.
         return []
     return [(completion_s, END_OF_STEER), *((completion_s + s, f"+{s:.2f} s") for s in INSTANTS_S)]
 
@@ -119,7 +119,7 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
     """Return the metrics of a sine with dwell.
 
     Returns:
-        - `steer_begin_time_s`, `steer_reversal_time_s`, `steer_completion_time_s`: from the beginning of the run.
+        - `steer_begin_time_s`, `steer_reversal_time_s`, `steer_completion_time_s`: from the start of the run.
         - `yaw_rate_reversal_peak_radps`: first peak of the yaw rate after the reversal, with its sign; and its time.
         - `yaw_rate_after_1000ms_share`, `yaw_rate_after_1750ms_share`: yaw rate so long after the completion of steer,
           as a fraction of this peak; below zero if the car turns the other way by then.

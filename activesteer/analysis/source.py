@@ -37,7 +37,7 @@ class Evaluable:
     def __init__(self, recording: RecordingLike) -> None:
         """Reject a run that is too short."""
         if len(recording.time_s) < 2:
-            raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated, at least 2 are needed")
+            raise RecordingError(f"a run of {len(recording.time_s)} rows cannot be evaluated; at least 2 are needed")
         self._recording = recording
         self.time_s, self.metadata = recording.time_s, recording.metadata
 

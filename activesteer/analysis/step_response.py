@@ -1,6 +1,6 @@
 """Metrics of a step steer and of a slowly increasing steer.
 
-The car runs straight before the step, so every value counts from zero. t = 0 is the instant at which the steering wheel
+The car runs straight before the step, so every value counts from zero. t = 0 is the time at which the steering wheel
 passes half of its final angle, interpolated between samples. A steady-state value is the mean over the last second.
 
 Source: ISO 7401, Road vehicles - Lateral transient response test methods, step input.
@@ -48,11 +48,11 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
         recording: A run with one step of the steering wheel, to either side, and at least two seconds after it.
 
     Returns:
-        Metric name, ending in its unit, to value. Times count from t = 0 [s], but `step_time_s` from the beginning of
+        Metric name, ending in its unit, to value. Times count from t = 0 [s], but `step_time_s` from the start of
         the run.
 
     Raises:
-        RecordingError: there is no step, it has no beginning, the run ends too early after it, or a channel is missing.
+        RecordingError: there is no step, it has no start, the run ends too early after it, or a channel is missing.
     """
     time_s = recording.time_s
     steering_rad = recording["steering_wheel_rad"]
@@ -78,7 +78,7 @@ def _step_time(time_s: Array, steering_rad: Array) -> float:
     final_rad = float(np.mean(steering_rad[time_s >= time_s[-1] - STEADY_WINDOW_S]))
     if not abs(final_rad) >= MIN_STEP_RAD:
         raise RecordingError(
-            f"the recording holds no step steer: the steering wheel ends at {math.degrees(final_rad):.3g} deg, "
+            f"the recording holds no step steer: the steering wheel ends at {math.degrees(final_rad):.3g} deg; "
             f"at least {math.degrees(MIN_STEP_RAD):.3g} deg to either side are needed",
             value=final_rad,
             allowed=MIN_STEP_RAD,

@@ -17,8 +17,8 @@ Paint = Callable[[str, str, float, float, str], str]
 as shown."""
 
 TYRE_USE_NOTE: Final = (
-    "tyre use is the force of a tyre relative to its peaks along and across, each alone; combined slip and shifts of "
-    "the tyre file let it exceed 1"
+    "tyre use is the force of a tyre relative to its longitudinal and lateral peaks at pure slip; combined slip and "
+    "shifts of the tyre file let it exceed 1"
 )
 
 

@@ -101,7 +101,7 @@ class CommandLine:
         words = list(sys.argv[1:] if arguments is None else arguments)
         command = next((word for word in words if not word.startswith("-")), None)
         if command in SUCCESSORS:
-            self._parser.error(f"there is no command {command!r} any more; use `activesteer {SUCCESSORS[command]}`")
+            self._parser.error(f"there is no command {command!r} any longer; use `activesteer {SUCCESSORS[command]}`")
         if command is not None and command not in self.names:
             self._parser.error(f"there is no command {command!r}; {nearest_names(command, self.names)}")
         options, unknown = self._parser.parse_known_args(words)

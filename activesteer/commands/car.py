@@ -21,8 +21,8 @@ vehicle: Final = command.with_actions("vehicle", "make a car from a table of har
         ".toml or .csv; see docs/own_car.md (default with --kc: its car.toml)", type=Path),
     arguments.option("--kc", "DIR", "measurements of a K&C rig, for axles of kind curves", type=Path),
     arguments.output("DIR", "folder for the files (default: vehicles/NAME)"),
-    arguments.option("--front", "KIND", "mcpherson, double_wishbone, curves (default: that of the table)"),
-    arguments.option("--rear", "KIND", "five_link, multilink, double_wishbone, curves (default: that of the table)"),
+    arguments.option("--front", "KIND", "mcpherson, double_wishbone, curves (default: from the table)"),
+    arguments.option("--rear", "KIND", "five_link, multilink, double_wishbone, curves (default: from the table)"),
     arguments.flag("--overwrite", "replace an earlier car in that folder"),
     arguments.JSON,
 )  # fmt: skip
@@ -59,7 +59,7 @@ def _new(options: argparse.Namespace) -> None:
     terminal.tell(options, values, lines)
 
 
-@vehicle("table", "print a table of the package, as a start",
+@vehicle("table", "print a table of the package, as a starting point",
     arguments.option("table", "NAME", "name of a table (default: print all names)", nargs="?"),
 )  # fmt: skip
 def _table(options: argparse.Namespace) -> None:

@@ -86,7 +86,7 @@ class _Failures(dict[str, str]):
     arguments.flag("--replace", "replace recordings of other settings"),
     arguments.flag("--all", "print all metrics, not only the key metrics of the manoeuvre"),
     arguments.option("--isolate", "SECONDS",
-        "run each FMU in a process of its own, in which it may crash, or hang for this time (default: 5 s)",
+        "run each FMU in a separate process, where it may crash, or hang for this time (default: 5 s)",
         type=float, nargs="?", const=5.0),
     arguments.option("--realtime", "FACTOR", "pace the steps to the clock; 2 is twice as fast (default: 1)", type=float,
         nargs="?", const=1.0),
@@ -300,7 +300,7 @@ def _plot(recordings: Mapping[str, Any], folder: Path, scenario: Any) -> list[Pa
     return figures
 
 
-@command("explore", "change a run by sliders, or drive the car by hand, in a local page",
+@command("explore", "change a run with sliders, or drive by hand, in a local page",
     arguments.option("--port", "N", "port on 127.0.0.1 (default: a free one)", type=int),
     arguments.flag("--no-browser", "print the address and open no browser"),
     arguments.output("DIR", "folder of your own controllers and manoeuvres, and of saved recordings", "."),

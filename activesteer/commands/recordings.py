@@ -123,7 +123,7 @@ def _check_page(file: Path) -> None:
     arguments.option("--new", "FOLDER",
         "make a folder with an example, to be replaced by your measured runs", type=Path),
     arguments.option("--standard", ("iso19364", "iso19365"),
-        "iso19364: cross plots over the lateral acceleration, for steady-state driving; iso19365: over time (default)"),
+        "iso19364: cross plots versus lateral acceleration, for steady-state driving; iso19365: over time (default)"),
     arguments.option("--filter", ("iso15037", "fmvss126", "none"),
         "zero-phase Butterworth filter of both sides: iso15037 (8 poles, 10.1 Hz; default), fmvss126 (12 poles, 6 Hz, "
         "steering wheel 10 Hz), or none"),
@@ -237,13 +237,13 @@ def _size(text: str) -> tuple[int, int]:
 
 @command("video", "make a film of a recording",
     arguments.RECORDING,
-    arguments.output("OUT.mp4", "the film (default: FILE.mp4 beside the recording)"),
+    arguments.output("OUT.mp4", "the film (default: FILE.mp4 next to the recording)"),
     arguments.option("--camera", ("chase", "top", "wheel"), "camera position", "chase"),
     arguments.option("--corner", _CORNERS, "wheel for the camera `wheel` (default: fl)"),
     arguments.option("--compare", "OTHER.mcap",
         "also show the car of another recording; may be repeated", many=True, type=Path),
     arguments.option("--layout", ("overlay", "side-by-side"),
-        "transparent cars in one picture, or one picture for each car",
+        "transparent cars in one view, or one view for each car",
         "overlay"),
     arguments.option("--gauges", ("full", "sideslip"), "all gauges, or one large sideslip angle for each car", "full"),
     arguments.option("--size", "WxH", "pixels", "1280x720", type=_size),
@@ -276,7 +276,7 @@ def _video(options: argparse.Namespace) -> None:
         frames = make_film(named, output, settings, progress)
     took = time.monotonic() - started
     print(
-        f"{output}: {frames} frames, {frames / options.fps:.1f} s at {options.fps:g} a second, made in {took:.1f} s",
+        f"{output}: {frames} frames, {frames / options.fps:.1f} s at {options.fps:g} fps, made in {took:.1f} s",
         file=sys.stderr,
     )
 

@@ -50,7 +50,7 @@ _CONTROLLER_COLUMNS: Final = {
 @command("study", "drive many runs over varied parameters",
     arguments.option("study", "STUDY_OR_DIR", "a study file or its name, or the folder of a study"),
     arguments.output("DIR", "folder for the results, needed for a new study; a study found there is resumed"),
-    arguments.controllers("those of the study"),
+    arguments.controllers("the controllers of the study"),
     arguments.option("--vehicle", "NAME_OR_PATH", "a car instead of the study's; may be repeated", many=True),
     arguments.option("--driver", "DRIVER", "a driver instead of the study's"),
     arguments.option("--samples", "N", "number of samples instead of the study's", type=int),
@@ -133,11 +133,11 @@ def _status(progress: dict[str, Any]) -> Iterator[str]:
 @command("tune", "minimise objectives, satisfy statements or violate a requirement",
     arguments.option("study", "STUDY", "a study file with a table [tune], or its name"),
     arguments.output("DIR", "folder of the search; a search found there is resumed", "tuning"),
-    arguments.controllers("with the goal violate, those of the file"),
+    arguments.controllers("with the goal violate, the controllers of the file"),
     arguments.option("-m --maneuver", "MANEUVER",
-        "one of the file; may be repeated (default: with the goal violate, all of the file)", many=True),
+        "a manoeuvre of the file; may be repeated (default: with the goal violate, all of the file)", many=True),
     arguments.one_of(
-        arguments.option("--trials", "N", "total number of sets of each search (default: that of the file)", type=int),
+        arguments.option("--trials", "N", "total number of sets of each search (default: from the file)", type=int),
         arguments.option("--runs", "N", "the same as a budget of runs, of which a set needs several", type=int),
     ),
     arguments.WORKERS, arguments.JSON,
@@ -186,7 +186,7 @@ def _lines(found: Tuning) -> Iterator[str]:
         if found.plausibility is None or trial is found.front[0]:
             yield from _values(trial)
     if pairs := found.never_together:
-        yield f"hold alone and never together: {', '.join(map('+'.join, pairs))}"
+        yield f"hold separately, but never together: {', '.join(map('+'.join, pairs))}"
     yield from (f"without effect: {key} changes no metric of any run" for key in found.without_effect)
 
 

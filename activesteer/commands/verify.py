@@ -156,16 +156,16 @@ def _test(options: argparse.Namespace) -> bool:
     return bool(result.failed)
 
 
-@command("bench", "where the time of a step goes",
+@command("bench", "measure the time of a step and of its parts",
     arguments.one_of(
-        arguments.flag("--tyre", "what a tyre's evaluation costs instead"),
+        arguments.flag("--tyre", "measure the evaluation of a tyre instead"),
         arguments.flag("--batch",
             "measure many cars in one native call instead: car-steps per second, processor time, memory"),
     ),
     arguments.JSON,
-    arguments.option("--rounds", "N", "the best of N counts (default: 5)", type=int),
-    description="Where the time of a step goes, in microseconds. Ratios to `bare` compare with an engine that has "
-    "neither tyres nor motion, ratios to `engine` with the engine alone on the same drive, its inputs played back.",
+    arguments.option("--rounds", "N", "repeat N times and print the best (default: 5)", type=int),
+    description="Measure the time of a step and of its parts, in microseconds. Ratios to `bare` compare with an engine "
+    "without tyres and motion. Ratios to `engine` compare with a replay of the same drive by the engine only.",
 )  # fmt: skip
 def _bench(options: argparse.Namespace) -> bool:
     from activesteer.studies import benchmark

@@ -446,12 +446,12 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
             known = ", ".join(repr(word) for word in words[:-1])
             raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
         return raw
-    wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}[hint]
+    wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a string"}[hint]
     good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
     if not good or (isinstance(raw, bool) and hint is not bool):
         raise source.fail(path, f"{shown(raw)} is not {wanted}", raw, hint)
     if isinstance(raw, str) and (len(raw) > MAX_TOML_LETTERS or not raw.isprintable()):
-        raise source.fail(path, f"{shown(raw)} is not a text of at most {MAX_TOML_LETTERS} printable characters", raw)
+        raise source.fail(path, f"{shown(raw)} is not a string of at most {MAX_TOML_LETTERS} printable characters", raw)
     if hint in (bool, str):
         return raw
     number: Any = raw

@@ -6,9 +6,9 @@ Axes follow ISO 8855: x forward, y left, z up; a left turn, a left steer and a l
 Roll is positive to the right (rotation about +x), pitch is positive nose down (rotation about +y).
 
 The vehicle axis system of the models has its origin on the road below the middle of the front axle in the
-design position; the rear axle lies at x = -wheelbase. Results are given for the centre of gravity (the site `cg`).
+design position; the rear axle is at x = -wheelbase. Results are given for the centre of gravity (the site `cg`).
 
-Tyre quantities are those of the ISO-W wheel axis system at the contact point: x along the wheel's heading, y to its
+Tyre quantities use the ISO-W wheel axis system at the contact point: x along the wheel's heading, y to its
 left, z normal to the road. A slip angle > 0 gives a lateral force < 0; a slip ratio > 0 drives.
 """
 

@@ -134,7 +134,7 @@ def why_no_file(path: str | os.PathLike[str]) -> str:
     try:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
-        return "is a link to nothing" if os.path.islink(path) else "does not exist"
+        return "is a broken link" if os.path.islink(path) else "does not exist"
     return "is a folder" if stat.S_ISDIR(mode) else "is not a regular file"
 
 

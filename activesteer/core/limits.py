@@ -95,7 +95,7 @@ MAX_LIST_ELEMENTS: Final = 1_000_000
 def check_count(count: int, most: int, what: str, error: type[ActiveSteerError], **place: Any) -> None:
     """Reject a count above `most`."""
     if count > most:
-        raise error(f"has {count} {what}, at most {most} are allowed", value=count, allowed=most, **place)
+        raise error(f"has {count} {what}; at most {most} are allowed", value=count, allowed=most, **place)
 
 
 def check_number(value: float, error: type[ActiveSteerError], *, text: Any = None, **place: Any) -> None:
@@ -180,5 +180,5 @@ def numbers(
 def text(value: object, key: str) -> str:
     """Return the value if it is a string, or raise an error."""
     if not isinstance(value, str):
-        raise fail(key, f"is {shown(value)}, expected a text")
+        raise fail(key, f"is {shown(value)}, expected a string")
     return value

@@ -21,7 +21,7 @@ and two spare numbers."""
 COMMAND_MAGIC: Final = b"ASC1"
 STATE_MAGIC: Final = b"ASS1"
 DRIVES, CONTROLS, RESTARTS = 1, 2, 4
-"""Flags of a command: the numbers of the driver count, those of the controller count, numbering begins anew."""
+"""Flags of a command: the driver's numbers count, the controller's numbers count, the numbering restarts."""
 TIMED_OUT: Final = 1
 """Flag of a state: no command is in use."""
 REACTIONS: Final = ("release", "hold", "stop")

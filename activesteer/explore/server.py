@@ -1,6 +1,6 @@
 """The server of the page: files of the page, and a WebSocket between the browser and the worker process.
 
-It listens on 127.0.0.1 alone. The address of the page contains a random token, and the headers Host and Origin must be
+It listens only on 127.0.0.1. The address of the page contains a random token, and the headers Host and Origin must be
 those of this server, so that neither another user's browser nor another page in yours can reach it.
 """
 
@@ -38,7 +38,7 @@ from activesteer.explore.messages import MAX_CONTROLLERS, MAX_MESSAGE_BYTES, End
 from activesteer.explore.worker import work
 
 HOST: Final = "127.0.0.1"
-TAKEN: Final = 4000, "This page was opened in another window. Reload it to go on here."
+TAKEN: Final = 4000, "This page was opened in another window. Reload it to continue here."
 """Code and reason with which the connection of a page ends when another window takes its place."""
 _TYPES: Final = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 _OF_REPORTS: Final = ("uPlot.iife.min.js", "uPlot.min.css", "page.css", "car.js", "touch.js")

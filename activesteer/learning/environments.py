@@ -41,7 +41,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     the path to the left of the line straight ahead after 0.3, 0.6, 1.0 and 1.5 s [m] +-100. `normalised` scales them to
     -1 to 1.
 
-    The reward and the reasons of an end are those of `Episodes`; `info` has `reward_terms`, `sideslip_rad` and `end`,
+    The reward and the reasons of an end follow `Episodes`; `info` has `reward_terms`, `sideslip_rad` and `end`,
     after a reset the number of the `car` that was drawn.
 
     Attributes:
@@ -115,7 +115,7 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def recording(self) -> Recording:
         """Repeat the episode with the actions so far, and return its recording.
 
-        The recording equals the episode to the last bit. Its `save` writes a file for `activesteer replay`, `video`
+        The recording is bit-identical to the episode. Its `save` writes a file for `activesteer replay`, `video`
         and `report`.
         """
         simulation = Simulation(self.episodes.loop(0).scenario)

@@ -198,7 +198,7 @@ class Episodes:
             task: Name of a task, or your own.
             n: Number of episodes at a time.
             vehicle: Name, path, or table of a vehicle.
-            actuators: Actuators that the agent commands: `rear`, `front`, `brakes`; by default those of the task.
+            actuators: Actuators that the agent commands: `rear`, `front`, `brakes`; default: from the task.
             driver: `driver` or `agent`: who drives; by default as in the task.
             sensors: `ideal` or `production`.
             cars: 1 for the nominal car; more for so many cars, roads and drivers from the ranges of the package's

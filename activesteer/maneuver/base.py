@@ -186,7 +186,7 @@ def read_columns(
     for row in rows:
         if any(row.cells[len(header.cells) :]):
             raise ManeuverError(
-                f"has {len(row.cells)} cells, the first line {len(header.cells)}; decimal commas need semicolons",
+                f"has {len(row.cells)} cells, but the first line {len(header.cells)}; decimal commas need semicolons",
                 file=path.name,
                 line=row.line,
             )

@@ -58,7 +58,7 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
     count = len(x_m)
     if count != len(y_m) or count < MIN_POINTS:
         raise ManeuverError(
-            f"the path has {count} x_m and {len(y_m)} y_m; as many of each are needed, at least {MIN_POINTS}",
+            f"the path has {count} x_m and {len(y_m)} y_m; equal numbers are needed, at least {MIN_POINTS}",
             value=(count, len(y_m)),
         )
 
@@ -71,7 +71,7 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
         if gap < _MIN_GAP_M:
             fail(i, "is the same as the point before; leave one of them out")
         if gap > _MAX_GAP_M:
-            fail(i, f"is {gap:.3g} m from the point before; at most {_MAX_GAP_M:g} m are allowed, add points")
+            fail(i, f"is {gap:.3g} m from the point before; at most {_MAX_GAP_M:g} m are allowed, so add points")
     for i in range(1, count - 1):
         ahead = math.atan2(y_m[i + 1] - y_m[i], x_m[i + 1] - x_m[i])
         behind = math.atan2(y_m[i] - y_m[i - 1], x_m[i] - x_m[i - 1])
@@ -82,7 +82,7 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
         chord = math.hypot(x_m[i + 1] - x_m[i - 1], y_m[i + 1] - y_m[i - 1])
         if 2.0 * math.sin(turn) * _MIN_RADIUS_M > chord:
             radius = chord / (2.0 * math.sin(turn))
-            fail(i, f"is a kink of {radius:.2g} m radius; at least {_MIN_RADIUS_M:g} m are needed, round it off")
+            fail(i, f"is a kink of {radius:.2g} m radius; at least {_MIN_RADIUS_M:g} m are needed, so round it off")
     if math.hypot(x_m[0], y_m[0]) > _MAX_START_M:
         fail(
             0,
@@ -93,7 +93,7 @@ def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[in
     if abs(heading) > _MAX_START_RAD:
         fail(
             0,
-            f"begins with a heading of {math.degrees(heading):.0f} deg: the car starts along x, the path may be at "
+            f"begins with a heading of {math.degrees(heading):.0f} deg: the car starts along x, and the path may be at "
             f"most {math.degrees(_MAX_START_RAD):g} deg off; turn it by {-math.degrees(heading):.0f} deg about (0, 0)",
         )
 
@@ -238,7 +238,7 @@ class ConstantRadius(Maneuver, kind="constant_radius"):
         """Return curvature and speed (see the base class)."""
         circle = self.circle
         fraction = within(time_s / circle.entry_s, 1.0)
-        # Half a wave of a cosine: the curvature has no kink at the beginning and the end of the rise.
+        # Half a wave of a cosine: the curvature has no kink at the start and the end of the rise.
         curvature = 0.5 * (1.0 - math.cos(math.pi * fraction)) / circle.radius_m
         rising_s = max(time_s - circle.entry_s, 0.0)
         speed = min(self.speed_mps + rising_s * circle.acceleration_mps2, circle.end_speed_mps)

@@ -69,7 +69,7 @@ class AlongCourse(Maneuver):
             gate_s = last / self.speed_mps
             raise ManeuverError(
                 f"is {self.duration_s:g} s, but at {3.6 * self.speed_mps:g} km/h the last gate, {last:g} m "
-                f"from the start, is reached at {gate_s:.1f} s; the car settles by {gate_s + _AFTER_S:.1f} s",
+                f"from the start, is reached at {gate_s:.1f} s; {gate_s + _AFTER_S:.1f} s are needed",
                 key="duration_s",
                 value=self.duration_s,
                 allowed=Range(gate_s + _AFTER_S),

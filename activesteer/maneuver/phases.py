@@ -128,9 +128,9 @@ class Phase:
         turns = self.steering_wheel_rad is not None or self.steering_factor is not None
         for key, given, beside, needed in (
             ("steering_factor", self.steering_factor is not None, self.steering_wheel_rad is None,
-             "beside steering_wheel_rad; leave one out"),
+             "together with steering_wheel_rad; leave one out"),
             ("steering_rate_radps", self.steering_rate_radps is not None, turns and self.steering_time_s is None,
-             "without a steering angle, or beside steering_time_s"),
+             "without a steering angle, or together with steering_time_s"),
             ("steering_time_s", self.steering_time_s is not None, turns, "without a steering angle"),
             ("acceleration_mps2", self.acceleration_mps2 is not None, self.speed_mps is not None, "without speed_mps"),
             ("until", self.until is not None, self.until is None or self.until != Until(), "without a condition"),

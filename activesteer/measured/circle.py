@@ -2,8 +2,8 @@
 
 No parameter of the car is fitted. Values that vary from lap to lap are sampled. Values with one unknown true value (a
 reading of the source, an assumption) are intervals. The box is the pair of distributions at the ends of all intervals;
-every distribution that the intervals allow lies between them (Oberkampf and Roy, Verification and Validation in
-Scientific Computing, 2010, section 13.4). The ends of each interval are driven alone to find which end has the smaller
+every distribution that the intervals allow is between them (Oberkampf and Roy, Verification and Validation in
+Scientific Computing, 2010, section 13.4). Both ends of each interval are driven to find which end has the smaller
 angle; the angle is taken to be monotonic in each.
 """
 

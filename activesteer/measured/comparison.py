@@ -1,7 +1,7 @@
 """Comparison of measured runs with a simulated one: time shift, noise, residuals, tolerance corridors.
 
 ISO 19364 (steady-state circular driving) and ISO 19365 (sine with dwell) define a corridor around the simulation that
-must contain the measurement. The first uses cross plots over the lateral acceleration, the second plots over time.
+must contain the measurement. The first uses cross plots versus the lateral acceleration, the second plots over time.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 _SEEN: Final = 1e-3
 """Noise, relative to the tolerance, below which a table leaves it out."""
 _STEP_S: Final = 0.01
-"""Step of the search [s]. The result is found between its instants."""
+"""Step of the search [s]. The result is found between its sample times."""
 _NEARLY: Final = 0.01
 """Among shifts this close to the best correlation, such as all periods of a sine, the shortest one is taken."""
 
@@ -152,11 +152,11 @@ def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[A
 
 
 STANDARDS: Final = {
-    "iso19364": "ISO 19364: cross plots over the lateral acceleration",
+    "iso19364": "ISO 19364: cross plots versus the lateral acceleration",
     "iso19365": "ISO 19365: over time",
 }
 SHARE_NEEDED: Final = 0.95
-"""Proportion of the samples that must lie in the corridor. This is an assumption: the standards require all points of
+"""Proportion of the samples that must be in the corridor. This is an assumption: the standards require all points of
 a mean curve, and do not treat single samples of a noisy signal."""
 _ACROSS: Final = "ay_mps2"
 _QUOTED: Final = "as quoted from ISO 19364 and ISO 19365; the texts of the standards were not available"
@@ -194,14 +194,14 @@ class Compared(NamedTuple):
 
     channel: str  # name of the channel
     tolerance: Tolerance  # allowed difference
-    # instants [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,)
+    # sample times [s] in the simulation's time or, in a cross plot, measured lateral accelerations [m/s2], shape (n,)
     x: Array
     measured: Array  # measured values, the mean of several runs, shape (n,)
     confidence: Array  # half of the 95 % interval of the mean, shape (n,); zero for one run
     simulated: Array  # simulated values, shape (n,); in a cross plot, values of the nearest point
     low: Array  # lower edge of the corridor at x; in a cross plot, of the curve of the simulation
     high: Array  # upper edge
-    within: NDArray[np.bool_]  # which samples lie in the corridor, shape (n,)
+    within: NDArray[np.bool_]  # which samples are in the corridor, shape (n,)
     noise: float = 0.0  # allowance for the noise of the measurement, by which the corridor is wider; 0 if none was made
 
     @property
@@ -298,7 +298,7 @@ def compare(
             smoothed[name] = [smooth(run, name, None) for run in (*measured, simulated)]
     allowed = dict.fromkeys(names, 0.0)
     for name, (*sides, _) in smoothed.items() if noise else ():
-        # Half of the 95 % interval of the noise in the mean of several runs.
+        # Half of the 95 % interval of the noise in the average of several runs.
         allowed[name] = _TWO_SIDED_95 * math.sqrt(sum(remaining**2 for _, remaining in sides)) / len(sides)
 
     def mean_of(name: str) -> tuple[Array, Array]:
@@ -338,7 +338,7 @@ def _crossed(
     name: str, tolerance: Tolerance, across: Array, measured: Array, confidence: Array,
     curve: tuple[Array, Array, Array], noise: float,
 ) -> Compared:  # fmt: skip
-    """Compare in a cross plot. A point is inside if it lies in the tolerance ellipse of a point of the curve."""
+    """Compare in a cross plot. A point is inside if it is in the tolerance ellipse of a point of the curve."""
     rows, places = (
         np.unique(np.linspace(0, count - 1, min(count, _CROSS_POINTS)).astype(int))
         for count in (len(across), len(curve[0]))

@@ -255,7 +255,7 @@ def rests_on(found: Fit) -> list[str]:
         ]
     return [
         *lines,
-        "They are 95 % intervals of single parameters, from the derivatives at the end of the search.",
+        "They are 95 % intervals of individual parameters, from the derivatives at the end of the search.",
         "The inputs are used as recorded: the intervals contain neither noise and offsets of steering and speed, nor "
         "errors of the model of the car.",
     ]

@@ -1,7 +1,7 @@
 """Validation of a car against the measured runs of a folder: prediction, fit and check.
 
 The *prediction* uses the vehicle file; of the factors, only those in `predict.factors` are free. The *fit* frees all
-factors. Both see the fit windows alone and are judged in the check windows. The band around the prediction contains
+factors. Both see only the fit windows and are judged in the check windows. The band around the prediction contains
 the curves with each interval at either end, after `predict.factors` were found again; effects of several intervals
 are added.
 """

@@ -210,9 +210,9 @@ def _circle(result: CircleValidation) -> tuple[list[Text], list[Section]]:
     if box := found["box"]:
         text = (
             f"From {box['low_deg']:.1f} to {box['high_deg']:.1f} deg, {box['width_deg']:.1f} deg wide: "
-            f"{box['measured_inside']} of {measured['n']} measured angles lie inside. Values with one unknown true "
+            f"{box['measured_inside']} of {measured['n']} measured angles are inside. Values with one unknown true "
             "value are intervals; the others vary from lap to lap. The table gives the "
-            f"{'second ' * two}prediction with the ends of each interval alone."
+            f"{'second ' * two}prediction with both ends of each interval, one interval at a time."
         )
         ends = [
             (each["name"], f"{each['low_deg']:.1f}", f"{each['high_deg']:.1f}", each["source"])
@@ -257,7 +257,7 @@ def overrides_text(found: Fit, name: str) -> str:
     lines = [f"# Found by `activesteer fit {name}.toml`; for --overrides, or the table [overrides] of a study."]
     lines += [f'"{key}" = {toml_value(value)}  # {words[key]}' for key, value in found.overrides.items()]
     for recording, own in found.own.items():
-        lines += [f"# in {recording} alone: {key} = {toml_value(value)}" for key, value in own.items()]
+        lines += [f"# only in {recording}: {key} = {toml_value(value)}" for key, value in own.items()]
     return "\n".join(lines) + "\n"
 
 

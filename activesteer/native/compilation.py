@@ -2,9 +2,9 @@
 
 numba keeps compiled functions on disk and compiles again if the file of a function changes. It does not notice a change
 in another file whose functions or constants were compiled in, nor another version of the engine. Here the key is the
-content of the file and of every file of the package that it imports, directly or not, with the tables (`.txt`) beside
+content of the file and of every file of the package that it imports, directly or not, with the tables (`.txt`) next to
 them and the versions of numba, llvmlite, numpy and mujoco. numba chooses the folder: `NUMBA_CACHE_DIR`, `__pycache__`
-beside the source, or the user's cache. If none of them can be written, every start compiles anew.
+next to the source, or the user's cache. If none of them can be written, every start compiles anew.
 
 The logger `activesteer` reports the start of compilation (INFO) and a missing cache folder (WARNING), each once.
 """

@@ -1,7 +1,7 @@
 """Records of numbers, and blocks of parameters for compiled code.
 
 The law of such a block is a function whose first argument is the block (`compilation.shared`). Python passes the
-object, compiled code passes its record. There is one law, and both results are equal to the last bit.
+object, compiled code passes its record. There is one law, and both results are bit-identical.
 """
 
 from __future__ import annotations

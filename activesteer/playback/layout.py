@@ -162,7 +162,7 @@ _SKY: Final = (176, 196, 214)
 _BEHIND: Final = rrb.EyeControls3D(position=(-7.6, 0.0, 3.5), look_target=(-0.4, 0.0, 0.2), eye_up=(0.0, 0.0, 1.0))
 # Left is up in the picture, so that the car drives to the right.
 _ABOVE: Final = rrb.EyeControls3D(position=(-1.3, 0.0, 6.5), look_target=(-1.3, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
-"""Eye positions in the frame that follows the car. Its origin lies on the road below the front axle."""
+"""Eye positions in the frame that follows the car. Its origin is on the road below the front axle."""
 
 
 def blueprint(runs: Sequence[ReplayedRun], *, compare: bool, page: int = 0) -> rrb.Blueprint:

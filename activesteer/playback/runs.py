@@ -97,7 +97,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[ReplayedRun]:
         RecordingError: there is none, or one has no rows or no poses.
     """
     if not recordings:
-        raise RecordingError("there is no recording to play back, at least one is needed")
+        raise RecordingError("there is no recording to play back; at least one is needed")
     runs = []
     for number, (name, look) in enumerate(run_looks(recordings).items(), start=1):
         recording = recordings[name]

@@ -72,7 +72,7 @@ class Panel(NamedTuple):
         areas: Areas behind the curves.
         limits: Ordinates that a standard sets, with their names.
         names: Names of the ordinates 0, 1, ... from above, if the ordinates are not numbers.
-        notes: Abscissa, ordinate and text of notes, which hang below their points, or beside them in named rows.
+        notes: Abscissa, ordinate and text of notes, which hang below their points, or next to them in named rows.
         log: Axes with a logarithmic scale: empty, `x` or `xy`.
         x_range: Least and greatest abscissa; None for what the curves need.
         y_range: Least and greatest ordinate, likewise.
@@ -133,7 +133,7 @@ class Picture(NamedTuple):
         title: Title of the picture.
         panels: The panels, row by row.
         scale: Meaning of the shades of curves: name, least and greatest value.
-        columns: Number of panels beside each other; 0 for a number that fits.
+        columns: Number of panels next to each other; 0 for a number that fits.
         width_in: Width [in].
         height_in: Height [in]; 0 for a height that fits.
         legend: Label and colour of more entries of a legend below all panels.

@@ -33,10 +33,10 @@ _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, bytes]]:
     """Load the file and look up the class or function.
 
-    The file can import modules beside it. Every call loads the file and these modules again.
+    The file can import modules next to it. Every call loads the file and these modules again.
 
     Returns:
-        The class or function; the parameters, typed as in TOML; and the contents of the file and of the modules beside
+        The class or function; the parameters, typed as in TOML; and the contents of the file and of the modules next to
         it that it imports, by their paths in its folder.
     """
 
@@ -164,7 +164,7 @@ def _imported_from(folder: Path, source: bytes) -> list[Path]:
         if isinstance(node, ast.ImportFrom):
             names |= {node.module} if node.module else {alias.name for alias in node.names}
     files = []
-    # A user's file may lie in our checkout, beside the package, which is loaded once.
+    # A user's file may be in our checkout, next to the package, which is loaded once.
     for name in sorted({name.partition(".")[0] for name in names} - {__name__.partition(".")[0]}):
         if is_file(folder / f"{name}.py"):
             files.append(folder / f"{name}.py")

@@ -146,7 +146,7 @@ class Plugin:
         label: Name in tables and file names, such as `MyController-gain=2`; with `+truth` if it uses the truth.
         origin: A class, a function, or an object that is copied.
         parameters: Arguments by name.
-        files: File of the code and the modules beside it that it imports, to be kept with the recording.
+        files: File of the code and the neighbouring modules that it imports, to be kept with the recording.
         is_builtin: Whether the code belongs to the package and needs no watching.
     """
 

@@ -136,7 +136,7 @@ class BlockEncoder:
         self._encode_poses(pose_ns, positions_m, quaternions)
         row_length, pose_length = len(self._rows.layout), len(self._poses.layout)
 
-        # In order of time; a pose follows the row of the same instant.
+        # In order of time; a pose follows the row of the same time.
         rows_before = np.searchsorted(row_ns, pose_ns, side="right")
         row_bytes = self._rows.block.reshape(-1).data
         pose_bytes = self._poses.block.reshape(-1).data

@@ -209,7 +209,7 @@ def _letters(value: str, key: str, maximum: int) -> None:
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise fail(ascii(key[:_SHOWN]), "is not a UTF-8 text") from None
+        raise fail(ascii(key[:_SHOWN]), "is not UTF-8 text") from None
 
 
 def check_metrics(metrics: Mapping[str, Any]) -> None:
@@ -371,7 +371,7 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
             continue
         if primitive.kind not in _FIELDS:
             raise RecordingError(
-                f"primitive of kind {primitive.kind!r}, known are: {', '.join(_FIELDS)}",
+                f"unknown primitive kind {primitive.kind!r}; known: {', '.join(_FIELDS)}",
                 key=primitive.body,
                 value=primitive.kind,
             )
@@ -404,10 +404,10 @@ def encode_scene(parts: Iterable[ScenePart]) -> bytes:
 def _add_link(update: Any, link: Link) -> None:
     if link.kind not in LINK_KINDS:
         raise RecordingError(
-            f"link of kind {link.kind!r}, known are: {', '.join(LINK_KINDS)}", key=link.name, value=link.kind
+            f"unknown link kind {link.kind!r}; known: {', '.join(LINK_KINDS)}", key=link.name, value=link.kind
         )
     if len(link.points) < 2:
-        raise RecordingError(f"has {len(link.points)} points, at least 2 are needed", key=link.name)
+        raise RecordingError(f"has {len(link.points)} points; at least 2 are needed", key=link.name)
     try:
         text = json.dumps(_link_of(link._asdict())._asdict())
     except (TypeError, ValueError) as error:
@@ -466,9 +466,9 @@ def check_scene(parts: Sequence[ScenePart]) -> None:
             check_numbers((*part.position_m, *part.quaternion), f"pose of a {part.kind}", -_MAX_SIZE_M, _MAX_SIZE_M)
             continue
         if part.kind not in LINK_KINDS:
-            raise RecordingError(f"{part.name}: link of kind {part.kind!r:.100}, known are: {', '.join(LINK_KINDS)}")
+            raise RecordingError(f"{part.name}: unknown link kind {part.kind!r:.100}; known: {', '.join(LINK_KINDS)}")
         if len(part.points) < 2:
-            raise RecordingError(f"{part.name} has {len(part.points)} points, at least 2 are needed")
+            raise RecordingError(f"{part.name} has {len(part.points)} points; at least 2 are needed")
         check_names([body for body, _ in part.points], f"bodies of {part.name}", limits.MAX_PARTS)
         numbers = [number for _, point in part.points for number in point]
         check_numbers([*numbers, part.radius_m], f"place or radius of {part.name}", -_MAX_SIZE_M, _MAX_SIZE_M)

@@ -356,7 +356,7 @@ class ChannelTable:
             for text in (channel.unit, channel.meaning):
                 if not isinstance(text, str) or len(text) > limits.MAX_DESCRIPTION_LETTERS or not text.isprintable():
                     raise RecordingError(
-                        f"channel {channel.name!r}: unit and meaning are texts of one line, not {text!r:.100}"
+                        f"channel {channel.name!r}: unit and meaning must each be one line of text, not {text!r:.100}"
                     )
             if not _GROUP.fullmatch(channel.group):
                 raise RecordingError(

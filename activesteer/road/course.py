@@ -96,7 +96,7 @@ class Course:
         path = table_of(course.get("path"), "course.path")
         x_m, y_m = (numbers(path.get(key), f"course.path.{key}") for key in ("x_m", "y_m"))
         if len(x_m) != len(y_m) or len(x_m) < 2:
-            raise fail("course.path", f"has {len(x_m)} x_m and {len(y_m)} y_m; as many of each are needed, at least 2")
+            raise fail("course.path", f"has {len(x_m)} x_m and {len(y_m)} y_m; equal numbers are needed, at least 2")
         if (np.hypot(np.diff(x_m), np.diff(y_m)) < MIN_CHORD_M).any():
             raise fail("course.path", "has two points in a row that are the same")
         lanes = sequence(course.get("lanes", ()), "course.lanes")
@@ -123,7 +123,7 @@ def _lane(table: object, key: str) -> Lane:
     sides = [number(lane.get(field), f"{key}.{field}") for field in Lane._fields[1:]]
     found = Lane(text(lane.get("name", ""), f"{key}.name"), *sides)
     if not (found.start_x_m <= found.end_x_m and found.right_y_m <= found.left_y_m):
-        raise fail(key, f"is {tuple(sides)}: it must end behind its start, and its left edge lie left of its right one")
+        raise fail(key, f"is {tuple(sides)}: it must end behind its start, and its left edge be left of its right edge")
     return found
 
 
@@ -200,7 +200,7 @@ class ProfileTable:
             if any(abs(value) > _HIGHEST_M for value in values or ()):
                 raise ManeuverError(f"is higher than {_HIGHEST_M:g} m", key=key)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
-            raise ManeuverError(f"is {self.s_m[-1] - self.s_m[0]:g} m long, at most {_MAX_LENGTH_M:g} m", key="s_m")
+            raise ManeuverError(f"is {self.s_m[-1] - self.s_m[0]:g} m long; allowed are {_MAX_LENGTH_M:g} m", key="s_m")
 
     def grid(self) -> Grid:
         """Return the grid of heights."""

@@ -9,7 +9,7 @@ Read are: blocks `$ROAD_CRG`, `$ROAD_CRG_FILE` (a reference to another file), `$
 slope, banking, length, width and curvature; treatment of missing heights), and the data. Missing heights are filled
 from the nearest height towards the middle of the row, unless the file wants zero; a hole there is an error. The place
 of the line in the world and the border modes do
-not matter: the car enters the surface at its beginning, and `road.outside` rules what lies beyond.
+not matter: the car enters the surface at its start, and `road.outside` rules what is beyond.
 
 Source: ASAM OpenCRG 1.2.0, user guide and file format.
 """
@@ -140,14 +140,14 @@ def _road(head: dict[str, float], mods: dict[str, float], definition: list[str],
     scale = {name: mods.get(name, 1.0) for name in _SCALES}
     step = head.get("reference_line_increment", 0.0) * scale["scale_length"]
     if not 1e-3 <= step <= 1000.0:
-        raise ManeuverError(f"REFERENCE_LINE_INCREMENT is {step:g} m, 0.001 to 1000 m are allowed")
+        raise ManeuverError(f"REFERENCE_LINE_INCREMENT is {step:g} m; 0.001 to 1000 m are allowed")
     data = _data(content, form, len(columns))
     limits.check_numbers(data, ManeuverError, key="data")
     if "reference_line_end_u" in head:
         span = (head["reference_line_end_u"] - head.get("reference_line_start_u", 0.0)) * scale["scale_length"]
         rows = round(span / step) + 1
         if not 2 <= rows <= len(data):
-            raise ManeuverError(f"has {len(data)} rows of data, its header says {rows}")
+            raise ManeuverError(f"has {len(data)} rows of data, but its header says {rows}")
         data = data[:rows]
     sections = [index for index, name in enumerate(columns) if name.startswith("long section")]
     if len(sections) < 2 or len(data) < 2:
@@ -162,10 +162,10 @@ def _road(head: dict[str, float], mods: dict[str, float], definition: list[str],
     banking = _channel(along, "banking", head.get("reference_line_start_b", 0.0), len(data)) * scale["scale_banking"]
     rise = np.concatenate([[0.0], np.cumsum(slope[1:]) * step])
     heights = heights + rise[:, None] + banking[:, None] * places
-    # Heights count from the middle of the beginning, where the car enters.
+    # Heights count from the middle of the start, where the car enters.
     heights = heights - float(np.interp(0.0, places, heights[0]))
     if not np.isfinite(heights).all() or np.abs(heights).max() > _HIGHEST_M:
-        raise ManeuverError(f"has heights that are not finite, or above {_HIGHEST_M:g} m")
+        raise ManeuverError(f"has heights that are not finite or exceed {_HIGHEST_M:g} m")
     turn = np.zeros(len(data) - 1)
     if "phi" in along:
         phi = along["phi"][1:]
@@ -202,7 +202,7 @@ def _data(data: bytes, form: str, columns: int) -> Array:
         rows = len(data) // row
         # Zeros fill the last record of 80 bytes.
         if len(data) % _LINE_BYTES and len(data) % row:
-            raise ManeuverError("has lost or gained bytes, as in a transfer as text; get it again as binary data")
+            raise ManeuverError("has lost or gained bytes, as in a text transfer; transfer it again in binary mode")
         limits.check_count(rows * columns, limits.MAX_CRG_POINTS, "points", ManeuverError)
         padding = min(_LINE_BYTES - 1, len(data) - len(data.rstrip(b"\0")))
         rows = max(rows - max(0, padding - len(data) % row) // row, 0)

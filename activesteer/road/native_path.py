@@ -1,7 +1,7 @@
 """Position of a car relative to a path, in native code because a driver needs it in every step.
 
 A place belongs to the nearest point of the path, so a place has one distance, also where the path crosses itself. Where
-a later pass lies on an earlier one, the earlier pass counts. A grid over the road holds the nearest point of each
+a later pass is on an earlier one, the earlier pass counts. A grid over the road holds the nearest point of each
 cell's centre; from there the kernel walks along the path to the nearest point of the place itself.
 """
 
@@ -123,7 +123,7 @@ _MAX_CELLS: Final = 65536
 _SAME_PASS: Final = 20
 """Points of the path further apart than this belong to different passes [-]."""
 _ON_EARLIER_M: Final = 1.0
-"""A later pass nearer to an earlier one than this lies on it [m]."""
+"""A later pass nearer to an earlier one than this is on it [m]."""
 
 
 class PathGrid(NamedTuple):

@@ -4,7 +4,7 @@ A road is a plane with a grade and a bank, on which there may be an uneven surfa
 from place to place. Places are given in the world axes of the recording, x along the track from the initial position of
 the centre of gravity, y to the left; or, with `along = "path"`, by the distance along the path of the manoeuvre's
 course and the side of that path. For a wheel, the friction at its contact point counts. While the car settles before
-the recording, it rolls on the plane, on `mu` alone.
+the recording, it rolls on the plane, only on `mu`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class RoadPatch:
     end_m: float
     """End along x or along the path, not included [m]."""
     mu: Friction
-    """Friction relative to that in the tyre files [-]."""
+    """Friction relative to the friction in the tyre files [-]."""
     side: Side = "both"
     """`both`, `left` (y > 0, or left of the path) or `right` (y <= 0)."""
     mu_end: Friction | None = None
@@ -133,7 +133,7 @@ class Road:
     }
 
     mu: Friction = 1.0
-    """Friction relative to that in the tyre files [-]."""
+    """Friction relative to the friction in the tyre files [-]."""
     grade: Annotated[float, Range(-0.5, 0.5)] = 0.0
     """Rise over run in the direction of travel [-]. Positive is uphill."""
     mu_left: Friction | None = None
@@ -159,7 +159,7 @@ class Road:
     """Random roughness of ISO 8608. Default: none."""
     crg: str | None = None
     """OpenCRG file: a path, or a name in the manoeuvre's folder. The car enters it at `start_m`. Its reference line is
-    that of the road, unless the road is laid along a path."""
+    the line of the road, unless the road is laid along a path."""
     crg_data: tuple[str, ...] = ()
     """Content of that file, compressed, as recordings keep it."""
     banking: BankingTable | None = None

@@ -191,7 +191,7 @@ def _check_asset(path: Path, name: str) -> bytes:
     if data.startswith(b"\x89PNG") and len(data) > 24:
         width, height = struct.unpack(">II", data[16:24])
         if width * height > _MAX_PIXELS:
-            raise _too_much(f"the picture {shown(path.name)} has {width * height:.3g} points", _MAX_PIXELS, name)
+            raise _too_much(f"the image {shown(path.name)} has {width * height:.3g} pixels", _MAX_PIXELS, name)
     return data
 
 

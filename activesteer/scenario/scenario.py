@@ -268,7 +268,7 @@ def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
     """Return the value of a key of the manoeuvre, the vehicle or the driver, in the unit of the key.
 
-    Keys and controllers are those of `resolve`.
+    `resolve` describes keys and controllers.
     """
     part, path = part_of(key, type(scenario.maneuver))
     if part == "controllers":
@@ -287,7 +287,7 @@ def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> A
         names = [field.name for field in fields(value)] if is_dataclass(value) else []
         field_name, factor = field_in_unit(name, names)
         if field_name is None:
-            raise ParameterError(f"{name} has no value here", key=key)
+            raise ParameterError(f"{name} has no value in this manoeuvre, vehicle or driver", key=key)
         value = getattr(value, field_name)
     return value / factor if factor != 1.0 else value
 

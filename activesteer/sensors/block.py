@@ -86,7 +86,7 @@ def _pass_teeth(chain, memory, speed_radps, timestep_s):
         again = direction if memory[at + SIDE] == -direction else 0.0
         memory[at + EDGES] += passed - again
         memory[at + SIDE] = direction
-        # Edges lie at whole teeth. Forwards, the phase is the angle since the last edge; backwards, the rest to one.
+        # Edges are at whole teeth. Forwards, the phase is the angle since the last edge; backwards, the rest to one.
         memory[at + AGE] = (phase if turned > 0.0 else 1.0 - phase) / abs(turned) * timestep_s
 
 

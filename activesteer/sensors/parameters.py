@@ -1,6 +1,6 @@
 """The table [sensors] of a vehicle file: kinds of sensors, and their errors.
 
-The default of each key comes from the preset: no error of any kind for `ideal`, those of production.toml for
+The default of each key comes from the preset: no error of any kind for `ideal`, the errors of production.toml for
 `production`.
 """
 
@@ -148,8 +148,8 @@ class Sensors:
     seed: Annotated[int, Range(0, 2**32 - 1)] | None = None
     """Seed of noise, bias and drift. Default 0. It has no effect if no sensor has any of these."""
     speed_from_wheels: bool | None = None
-    """Whether the speed is that of the wheels that are not driven (of all wheels if all are driven) times their rolling
-    radius. Else it is the car's own."""
+    """Whether the speed comes from the undriven wheels (from all wheels if all are driven) times their rolling radius.
+    Otherwise it is the car's true speed."""
 
     if TYPE_CHECKING:
 

@@ -52,8 +52,8 @@ _WHEEL_TORQUES: Final = [
 class Batch(Copyable):
     """N independent cars in one manoeuvre, with individual overrides.
 
-    All inputs and outputs are arrays whose first axis is the car. The trajectory of each car is equal to the last bit
-    to that of a `Simulation` with the same inputs, for any number of cars and threads.
+    All inputs and outputs are arrays whose first axis is the car. Each trajectory is bit-identical to the
+    trajectory of a `Simulation` with the same inputs, for any number of cars and threads.
 
     The package's driver, held commands, and the controllers `none`, `ars`, `afs` and `lqr` run in native code on all
     threads. Every other driver or controller is called in Python, car by car.

@@ -234,7 +234,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
             simulated_s, finished = drive(simulation, scene, viewer, pacer, keys)
             slow = f", {pacer.lost_s:.1f} s slower than the clock" if pacer.lost_s >= 0.1 else ""
             if finished:
-                print(f"{simulated_s:.1f} s driven{slow}; R drives again, close the window to end", file=sys.stderr)
+                print(f"{simulated_s:.1f} s driven{slow}; press R to drive again, or close the window", file=sys.stderr)
             elif not keys.restart:
                 print(f"closed at {simulated_s:.1f} s{slow}", file=sys.stderr)
             while finished and viewer.is_running() and not keys.restart:

@@ -30,7 +30,7 @@ class RealtimePacer:
     def await_step(self) -> None:
         """Wait until the time of the next step.
 
-        A step that begins after its instant is not skipped: later steps begin at once until the run has caught up.
+        A step that begins late is not skipped: later steps begin at once until the run has caught up.
         """
         now_s = time.perf_counter()
         if self._start_s is None:

@@ -5,7 +5,7 @@ process and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/ac
 this folder at any time. A file holds the number and a hash of key and number, so a damaged or misplaced file is
 ignored. If the folder cannot be read or written, nothing is stored there.
 
-Mass, yaw inertia and axle distances are those of the model at static ride; see `studies.linear.identification`.
+Mass, yaw inertia and axle distances come from the model at static ride; see `studies.linear.identification`.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def slow_actuators(plugin: Plugin, scenario: Scenario, vehicle: Vehicle) -> str:
     rates = steering_rates(vehicle.model, scenario.car.config)._asdict() if needed else {}
     return "; ".join(
         f"{name.replace('rear', 'rear steering')} turns the wheels at {math.degrees(rates[name]):.0f} deg/s, "
-        f"{plugin.label} needs {math.degrees(need_radps):.0f} deg/s"
+        f"but {plugin.label} needs {math.degrees(need_radps):.0f} deg/s"
         for name, need_radps in needed.items()
         if rates[name] < _SLOWER * need_radps
     )

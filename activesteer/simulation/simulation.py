@@ -117,7 +117,7 @@ class Simulation(Copyable):
             overrides: Dotted key -> value.
             driver: Name, path or table of a driver, or your own code.
             timestep_s: Step of engine, driver and controller [s].
-            realtime: Whether each step begins at its instant by the clock; a number is the pace, 2 for twice as fast.
+            realtime: Whether each step begins at its time by the clock; a number is the pace, 2 for twice as fast.
             link: Link to another process that gives commands, such as `activesteer.coupling.udp.UdpLink(5005)`.
 
         Raises:

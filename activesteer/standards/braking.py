@@ -128,7 +128,7 @@ def in_a_turn(runner: StandardRunner) -> Findings:
         worst = max(done, key=lambda run: abs(run.metric("yaw_rate_deviation_after_1000ms_radps")))
         deviation = math.degrees(worst.metric("yaw_rate_deviation_after_1000ms_radps"))
         summary = (
-            f"largest yaw rate deviation {deviation:+.1f} deg/s 1 s after the beginning of braking "
+            f"largest yaw rate deviation {deviation:+.1f} deg/s 1 s after the start of braking "
             f"({'turns in' if deviation > 0.0 else 'runs wide'}), at {worst.metric('mean_deceleration_mps2'):.1f} m/s² "
             f"of deceleration; {len(done)} of {len(runs)} runs evaluated"
         )

@@ -71,7 +71,7 @@ def examine(runner: StandardRunner) -> Findings:
 
 
 def _fixed_angle(runner: StandardRunner, car: CarGeometry) -> list[StandardRun]:
-    """Drive with a fixed steering wheel angle, the Ackermann angle of the radius, and rising speed."""
+    """Drive at rising speed with the steering wheel held at the Ackermann angle of the radius."""
     angle_deg = math.degrees(car.steering_ratio * car.wheelbase_m / FIXED_RADIUS_M)
     speed_mps = _START_KMH / 3.6
     maneuver: dict[str, Any] = {

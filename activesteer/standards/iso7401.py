@@ -114,7 +114,7 @@ def examine(runner: StandardRunner) -> Findings:
         _coherence_table(found, weak),
     ]
     pictures = [
-        Picture("Step", time_panels(steps, _STEP_CHANNELS, _BEGIN_S, "the beginning of steer")),
+        Picture("Step", time_panels(steps, _STEP_CHANNELS, _BEGIN_S, "the start of steering")),
         *(_bode(name, {kind: responses[name] for kind, responses in found.items() if responses}) for name in _NAMES),
     ]
     return Findings(values, summary, tables, pictures)

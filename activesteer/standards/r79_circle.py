@@ -105,7 +105,7 @@ def examine(runner: StandardRunner) -> Findings:
     summary = f"{_effort_words(efforts)}. Faults on a circle are not judged: {_fault_words(faults)}"
     force = {f"{name.replace('_', ' ')}, {side}": run for name, runs in spirals.items() for side, run in runs.items()}
     pictures = [
-        Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the beginning of steer")),
+        Picture("Spiral at 10 km/h", time_panels(force, _CHANNELS[:2], _BEGIN_S, "the start of steering")),
         _dots(faults),
     ]
     return Findings(values, summary, [_effort_table(efforts), _fault_table(faults)], pictures)

@@ -1,6 +1,6 @@
 """The linear single-track model: equations, steady state, and prediction of the rear angle.
 
-Also the parameters that a two-track model needs beyond those of the single-track model.
+Also the parameters that a two-track model needs in addition.
 
 Symbols of the source: V front axle, H rear axle; C cornering stiffness of an axle, l_V and l_H distance of the centre
 of gravity to the axles, l their sum, m mass, J_z yaw inertia, v speed, beta sideslip angle, psi_dot yaw rate, delta

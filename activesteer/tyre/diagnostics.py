@@ -37,7 +37,7 @@ _BOOKKEEPING: Final = (
 _SECTIONS: Final = {
     "LONGITUDINAL_COEFFICIENTS": (("RBX1", "RCX1"), "combined slip does not reduce the longitudinal force"),
     "LATERAL_COEFFICIENTS": (("RBY1", "RCY1"), "combined slip does not reduce the lateral force"),
-    "ALIGNING_COEFFICIENTS": (("QBZ1", "QDZ1"), "there is no pneumatic trail, the aligning moment is about zero"),
+    "ALIGNING_COEFFICIENTS": (("QBZ1", "QDZ1"), "there is no pneumatic trail, so the aligning moment is about zero"),
     "OVERTURNING_COEFFICIENTS": (("QSX1", "QSX2", "QSX3"), "there is no overturning moment"),
     "ROLLING_COEFFICIENTS": (("QSY1",), "there is no rolling resistance"),
 }
@@ -73,7 +73,7 @@ def _missing(params: TyreParameters) -> Iterator[tuple[str, str]]:
     if motorcycle:
         yield (
             f"{' and '.join(motorcycle)} given",
-            "the contour of a motorcycle tyre is not modelled, large camber is wrong",
+            "the contour of a motorcycle tyre is not modelled, so results at large camber are wrong",
         )
 
 
@@ -94,7 +94,7 @@ def _scales(params: TyreParameters) -> Iterator[tuple[str, str]]:
 def _frame(params: TyreParameters) -> Iterator[tuple[str, str]]:
     nominal, radius = params["FNOMIN"], params["UNLOADED_RADIUS"]
     if not NOMINAL_LOAD_N[0] <= nominal <= NOMINAL_LOAD_N[1]:
-        yield f"FNOMIN = {nominal:g} N", f"car tyres lie between {NOMINAL_LOAD_N[0]:g} and {NOMINAL_LOAD_N[1]:g} N"
+        yield f"FNOMIN = {nominal:g} N", f"car tyres have {NOMINAL_LOAD_N[0]:g} to {NOMINAL_LOAD_N[1]:g} N"
     deflection = nominal / params["VERTICAL_STIFFNESS"] / radius
     if not STATIC_DEFLECTION[0] <= deflection <= STATIC_DEFLECTION[1]:
         yield (
@@ -144,7 +144,7 @@ def _levels(params: TyreParameters) -> Iterator[tuple[str, str]]:
         if params[key] <= 0.0:
             yield (
                 f"{key} = {params[key]:g} is negative",
-                "some published sets carry the sign in it; the sign of the stiffness decides which way the force acts",
+                "some published sets store the sign here; the sign of the stiffness sets the direction of the force",
             )
         if not FRICTION_RANGE[0] <= abs(value) <= FRICTION_RANGE[1]:
             yield (

@@ -156,7 +156,7 @@ class MagicFormula:
             gamma_rad: Camber [rad], positive about +x.
             pressure_Pa: Inflation pressure [Pa]; None for the pressure in the file.
             vx_mps: Speed along the heading [m/s]; None for the speed of the measurement.
-            road_friction: Friction of the road relative to that of the file.
+            road_friction: Friction of the road relative to the friction of the file.
             turn_slip_1pm: Yaw rate over speed [1/m], positive to the left; MF 6.x only.
 
         Returns:

@@ -375,7 +375,7 @@ class RearActuator(ElectricActuator):
     arrangement: Literal["per_side", "central"] | None = None
     """One actuator at each side, or one in the middle that moves both toe links."""
     limit_rad: Annotated[float, Range(math.radians(0.5), math.radians(15.0))] | None = None
-    """Largest wheel angle to either side as a demand. The end stops lie 3 % beyond [rad]."""
+    """Largest wheel angle to either side as a demand. The end stops are 3 % beyond [rad]."""
     lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
     """Travel per turn of the screw [m]."""
     screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None

@@ -88,7 +88,7 @@ def _cam_height(surface, numbers, obstacles, first, last, cam, reach, coarse, s,
         if z > best:
             best, at = z, x
     for index in range(first, last):
-        # A cam touches a step at its corner, which lies between the places above.
+        # A cam touches a step at its corner, which is between the places above.
         it = obstacles[index]
         rate = ahead_s + it.skew * ahead_d
         if it.shape == PLATEAU and abs(rate) > _LEAST_RATE:

@@ -385,7 +385,7 @@ _SLOTS: Final = (
 def _install() -> None:
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         raise ModelError(
-            "NUMBA_DISABLE_JIT is set, and a car needs compiled code; without it only kernels such as those of "
+            "NUMBA_DISABLE_JIT is set, but a car needs compiled code; without it only kernels such as those of "
             "activesteer.tyre.kernels can be called"
         )
     present = [get() for _, get, _ in _SLOTS]

@@ -71,7 +71,7 @@ class TyreFitment:
     """Viscous coefficient of the contact patch at rest [N s/m]: a third of critical for a wheel of 1 kg m2 that
     oscillates on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
     conventions: TyreConventions = TyreConventions()
-    """Conventions that a tyre file leaves open; default those of this package."""
+    """Conventions that a tyre file leaves open. Default: the conventions of this package."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class Load:
     roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6
     """Height of its centre of gravity above the road [m]."""
     fuel_kg: Annotated[float, Range(-100.0, 200.0)] = 0.0
-    """Fuel in addition to that in the model [kg]. Negative is less."""
+    """Fuel in addition to the fuel in the model [kg]. Negative is less."""
     fuel_position_m: Position | None = None
     """Position of the tank, vehicle axes [m]; default 0.4 m ahead of the rear axle, 0.35 m high."""
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
@@ -272,7 +272,7 @@ class VehicleParameters:
         "payload_kg": _MASS_HINT,
         "cg_height_change_m": _GRAVITY_HINT,
         **dict.fromkeys(("roof_kg", "roof_load_kg"), "load.roof_kg loads the roof, at load.roof_height_m"),
-        **dict.fromkeys(("fuel", "fuel_kg"), "load.fuel_kg is fuel in addition to that in the model"),
+        **dict.fromkeys(("fuel", "fuel_kg"), "load.fuel_kg is fuel in addition to the fuel in the model"),
         **dict.fromkeys(("springs", "spring_rate", "spring_stiffness"), "factors.spring_rate scales the springs"),
         **dict.fromkeys(("mu", "grip"), "road.mu is the road's, factors.tyre_friction scales the tyres"),
     }

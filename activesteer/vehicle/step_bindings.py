@@ -326,7 +326,7 @@ class WheelSet:
                 )
 
     def apply(self, torques: WheelTorques) -> None:
-        """Set the torques of single wheels, immediately and without the limits of the engine."""
+        """Set the torques of individual wheels, immediately and without the limits of the engine."""
         numbers = torque_numbers(torques)
         self._ctrl[self.bound["drives"]], self._ctrl[self.bound["brakes"]] = numbers[:4], numbers[4:]
 

@@ -59,11 +59,11 @@ def evaluated(coefficients: NDArray[np.float64], x: NDArray[np.float64] | float)
 
 
 def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float) -> ToeLinkMap:
-    """Compute the map of a corner."""
+    """Compute the map between link length and steer angle of a corner."""
     solver = _Corner(model, corner, link)
     slope = (solver.angle(1e-4) - solver.angle(-1e-4)) / 2e-4
     if abs(slope) < 0.5:
-        raise ModelError(f"the tendon {link!r} does not steer its wheel: {slope:.3g} rad/m, at least 0.5 are needed")
+        raise ModelError(f"the tendon {link!r} does not steer its wheel: {slope:.3g} rad/m; at least 0.5 are needed")
     reach = _BEYOND * limit_rad / abs(slope)
     minimum = 0.0
     for _ in range(4):
@@ -81,7 +81,7 @@ def toe_link_map(model: mujoco.MjModel, corner: str, link: str, limit_rad: float
     ways = [_fit(angles, travels), _fit(travels, angles)]
     for coefficients, x, y in zip(ways, (angles, travels), (travels, angles), strict=True):
         if np.abs(evaluated(coefficients, x) - y).max() > _FIT * np.ptp(y):
-            raise ModelError(f"the tendon {link!r}: steer angle over length is not a smooth curve up to the limit")
+            raise ModelError(f"the tendon {link!r}: steer angle versus length is not a smooth curve up to the limit")
     ends = np.abs(evaluated(ways[0], np.array([-limit_rad, limit_rad])))
     return ToeLinkMap(ways[0], ways[1], float(ends.max()))
 

@@ -131,7 +131,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
     lever = _lever([points[name] for name in inner], points[outer], lower, (upper - lower) / length)
     if not _MIN_LEVER < lever < _MAX_LEVER:
         raise ParameterError(
-            f"lies at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on an arm lies between "
+            f"is at {lever:.2f} of the length of {carrier}, seen from its inner end; a {part} on an arm is between "
             f"{_MIN_LEVER:g} and {_MAX_LEVER:g}. Is {part}_on right, and {part}_outer on the left side?",
             key=f"{axle}.points.{part}_outer",
         )

@@ -48,7 +48,7 @@ def _rack_per_steer(front: Axle) -> float:
     if abs(per_steer) < 0.02:
         raise ParameterError(
             f"the tie rod passes the steering axis at {1e3 * abs(per_steer):.0f} mm and cannot steer the wheel; "
-            "tie_rod_outer must lie ahead of or behind the line through the upper and the lower joint",
+            "tie_rod_outer must be ahead of or behind the line through the upper and the lower joint",
             key="front",
         )
     return per_steer
@@ -369,7 +369,7 @@ def _kingpin(table: CarTable, centre: Array, log: Log) -> tuple[Array, Array]:
     # The compact's: caster 2 deg, inclination 4 deg, 21 mm inside and 4 mm behind the wheel centre.
     first = centre + np.array([0.0, -0.013, -0.1129])
     second = centre + np.array([-0.008, -0.029, 0.1171])
-    log.note("rear_steering", "caster 2 deg, inclination 4 deg", "the compact's axis beside the wheel centre")
+    log.note("rear_steering", "caster 2 deg, inclination 4 deg", "the compact's axis relative to the wheel centre")
     return first, second
 
 
@@ -388,7 +388,7 @@ def check_origin(car: CarDesign, given: CarTable) -> None:
     rear = car.rear.wheel_centre_m[0]
     if rear > -0.5:
         raise ParameterError(
-            f"is at x {rear:.3f} m; x points forward, so the rear axle lies at minus the wheelbase. Are the rear "
-            "points those of the axle by itself?",
+            f"is at x {rear:.3f} m; x points forward, so the rear axle is at minus the wheelbase. Are the rear "
+            "points relative to the rear axle?",
             key="rear.points.wheel_centre",
         )

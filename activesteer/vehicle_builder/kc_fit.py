@@ -239,7 +239,7 @@ def _wheel_paths(samples: Samples, radius_m: float) -> tuple[Array | None, Array
     contact = samples.moved("contact_outwards")
     if outwards is None and contact is not None:
         camber = samples.moved("camber")
-        # The contact point lies below the centre in the wheel plane: more camber (top outwards) moves it inwards.
+        # The contact point is below the centre in the wheel plane: more camber (top outwards) moves it inwards.
         outwards = contact if camber is None else contact + radius_m * camber
     if forward is None:
         forward = samples.moved("contact_forward")

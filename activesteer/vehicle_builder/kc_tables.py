@@ -73,7 +73,7 @@ def smoothed(x: Array, y: Array, at: Array) -> Array:
     places = len(np.unique(np.round(x / np.ptp(x), 3)))
     intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
     low, high = float(x.min()), float(x.max())
-    # Every interval needs a sample; where they are dense at one place alone, there are fewer intervals.
+    # Every interval needs a sample; where they are dense at only one place, there are fewer intervals.
     while intervals > 1 and not np.histogram(x, intervals)[0].all():
         intervals -= 1
     knots = np.concatenate([[low] * 3, np.linspace(low, high, intervals + 1), [high] * 3])
@@ -185,7 +185,7 @@ def _raw_columns(file: Path) -> dict[str, Array]:
     for row in rows[1:]:
         if len(row.cells) != len(heads):
             raise ParameterError(
-                f"has {len(row.cells)} cells, the first row {len(heads)}", file=file.name, line=row.line
+                f"has {len(row.cells)} cells, but the first row has {len(heads)}", file=file.name, line=row.line
             )
     return {
         head: np.array(
@@ -213,7 +213,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
     """Return the channel of a column, with its side, and the factor to SI units."""
     match = _HEAD.fullmatch(name)
     if match is None:
-        raise ParameterError(f"{name!r} is not a channel with its unit, as 'left_toe [deg]'", file=file.name, key=head)
+        raise ParameterError(f"{name!r} is not a channel and its unit, as 'left_toe [deg]'", file=file.name, key=head)
     channel = match["name"].strip().lower().replace(" ", "_")
     bare = channel.removeprefix("left_").removeprefix("right_")
     if bare not in CHANNELS:

@@ -258,7 +258,7 @@ def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
     }
     if min(loads.values()) <= 0.0:
         raise ModelError(
-            f"the centre of gravity, at x {body.cg_m[0]:.3f} m, does not lie between the axles: the car falls over"
+            f"the centre of gravity, at x {body.cg_m[0]:.3f} m, is not between the axles: the car falls over"
         )
     ratios: dict[str, tuple[float, float]] = {}
     rates: dict[str, float | None] = {}

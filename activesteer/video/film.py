@@ -110,7 +110,7 @@ class Film:
     def __init__(self, recordings: Mapping[str, Recording], settings: Settings) -> None:
         """Build the scenes."""
         if not recordings:
-            raise ParameterError("there is no recording to make a film of, at least one is needed")
+            raise ParameterError("there is no recording to film; at least one is needed")
         self.settings = settings
         looks = run_looks(recordings)
         self._tracks = [Track(recording, name) for name, recording in recordings.items()]

@@ -46,7 +46,7 @@ def backend() -> str:
         problems[name] = problem
     install = " or ".join(f"apt-get install {BACKENDS[name]}" for name in names if name in BACKENDS)
     chosen = f" (MUJOCO_GL={wanted})" if len(names) == 1 else ""
-    msg = f"no pictures can be drawn here{chosen}: {'; '.join(f'{name}: {why}' for name, why in problems.items())}"
+    msg = f"no images can be rendered here{chosen}: {'; '.join(f'{name}: {why}' for name, why in problems.items())}"
     raise PlaybackError(f"{msg}. The libraries come with: {install}" if install else msg, value=problems)
 
 
@@ -91,7 +91,7 @@ class Offscreen:
             self._context.make_current()
             self._drawer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         except (ImportError, RuntimeError, mujoco.FatalError) as reason:
-            msg = f"no pictures of {size[0]} x {size[1]} can be drawn here with {name}: {reason}"
+            msg = f"no images of {size[0]} x {size[1]} can be rendered here with {name}: {reason}"
             raise PlaybackError(msg) from reason
         finally:
             del os.environ["MUJOCO_GL"]
@@ -100,7 +100,7 @@ class Offscreen:
         if self._drawer.offWidth < size[0] or self._drawer.offHeight < size[1]:
             maximum = f"{self._drawer.offWidth} x {self._drawer.offHeight}"
             self.close()
-            raise PlaybackError(f"pictures of {size[0]} x {size[1]} exceed the size that can be drawn here: {maximum}")
+            raise PlaybackError(f"images of {size[0]} x {size[1]} exceed the size that can be rendered here: {maximum}")
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawer)
 
     def prepare(self, data: mujoco.MjData, camera: mujoco.MjvCamera) -> mujoco.MjvScene:

@@ -85,10 +85,10 @@ def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_sn
 @pytest.mark.parametrize(
     ("controller", "changes", "told"),
     [
-        ("lqr", CARS["screw"], "rear steering turns the wheels at 12 deg/s, lqr needs 25 deg/s"),
-        ("integrated", CARS["screw"], "rear steering turns the wheels at 12 deg/s, integrated needs 25 deg/s"),
+        ("lqr", CARS["screw"], "rear steering turns the wheels at 12 deg/s, but lqr needs 25 deg/s"),
+        ("integrated", CARS["screw"], "rear steering turns the wheels at 12 deg/s, but integrated needs 25 deg/s"),
         ("lqr", {"superposition_actuator.preset": "strain_wave", "superposition_actuator.speed_limit_radps": 200.0},
-         "superposition turns the wheels at 15 deg/s, lqr needs 25 deg/s"),
+         "superposition turns the wheels at 15 deg/s, but lqr needs 25 deg/s"),
         ("lqr", {}, None), ("esc", CARS["screw"], None), ("none", CARS["screw"], None),
     ],
 )  # fmt: skip

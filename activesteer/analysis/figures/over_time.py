@@ -67,7 +67,7 @@ class DrawnRun(NamedTuple):
 def drawn_runs(recordings: Mapping[str, RecordingLike]) -> list[DrawnRun]:
     """Return the runs in the paper's order, with the fixed colours of the three systems."""
     if not recordings:
-        raise ParameterError("there is no recording to draw, at least one is needed")
+        raise ParameterError("there is no recording to draw; at least one is needed")
     return [DrawnRun(recordings[name], look) for name, look in run_looks(recordings).items()]
 
 

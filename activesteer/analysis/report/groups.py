@@ -92,7 +92,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
 def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
     """Return the runs by manoeuvre, in the paper's order. Runs in the paper's setting form separate groups."""
     if not 1 <= len(recordings) <= MAX_RUNS:
-        raise ParameterError(f"{len(recordings)} recordings; a report is made of 1 to {MAX_RUNS}", allowed=MAX_RUNS)
+        raise ParameterError(f"{len(recordings)} recordings; a report takes 1 to {MAX_RUNS}", allowed=MAX_RUNS)
     by_maneuver: dict[tuple[str, bool], dict[str, Recording]] = {}
     for source, recording in recordings.items():
         if len(recording) == 0:

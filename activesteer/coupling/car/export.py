@@ -77,7 +77,7 @@ class Export(NamedTuple):
     variables: list[Variable]  # its variables; the value reference is the place
     token: str  # digest of everything that decides its behaviour
     library: bytes
-    engine: tuple[str, bytes]  # the engine's library beside it, and its name
+    engine: tuple[str, bytes]  # the engine's library next to it, and its name
     timestep_s: float  # length of a step [s]
 
 

@@ -1,6 +1,6 @@
 """Compiled objects of an exported car: compilation and relocation.
 
-The code comes from the same kernels as that of a simulation, so that both give the same numbers to the last bit.
+The code comes from the same kernels as the code of a simulation, so both are bit-identical.
 numba keeps the compiled module in an interface of its own (`_library`), which may change with a new version.
 
 The native step finds everything by addresses in its records. Here each address becomes a `Relocation`: the place of the

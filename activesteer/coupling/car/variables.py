@@ -79,7 +79,7 @@ def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
         found.append(Variable(name, unit, meaning, INPUT, starts[name], low, high))
     forces = -_MAX_TORQUE_NM, _MAX_TORQUE_NM
     for ending, unit, words, (low, high) in (
-        ("brake_pressure_request_Pa", "Pa", "brake pressure beside the pedal's", (0.0, _MAX_PRESSURE_PA)),
+        ("brake_pressure_request_Pa", "Pa", "brake pressure in addition to the pedal's", (0.0, _MAX_PRESSURE_PA)),
         ("drive_torque_Nm", "Nm", "drive torque if wheel_torques_set, forward positive", forces),
         ("brake_torque_Nm", "Nm", "brake torque if wheel_torques_set, against the rotation", (0.0, _MAX_TORQUE_NM)),
     ):
@@ -87,7 +87,7 @@ def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
             Variable(f"{corner}_{ending}", unit, f"{words}, {place}", INPUT, 0.0, low, high)
             for corner, place in CORNERS_IN_WORDS.items()
         ]
-    meaning = "1 if the torques of the single wheels replace drive torque and pedal, else 0"
+    meaning = "1 if the torques of the individual wheels replace drive torque and pedal, else 0"
     return [
         *found,
         Variable("wheel_torques_set", "", meaning, INPUT, 0.0, 0.0, 1.0),

@@ -455,7 +455,7 @@ def _grouped(links: Sequence[Link]) -> list[Group]:
 def find_fmu(given: str | os.PathLike[str], kind: Kind) -> Plugin:
     """Read an FMU as a controller or driver.
 
-    A file with the same name and the ending `.toml` beside it is its map: a table for each variable whose name or unit
+    A file with the same name and the ending `.toml` next to it is its map: a table for each variable whose name or unit
     differs from ours, such as `r = { signal = "yaw_rate_radps", unit = "deg/s" }`.
     """
     text, _, rest = os.fspath(given).partition("?")

@@ -1,6 +1,6 @@
 """The K&C rig and its result.
 
-A column is a channel and its unit: `left_toe [deg]`. Signs are those of ISO 8855 and of `Sweep`: toe positive toe-in,
+A column is a channel and its unit: `left_toe [deg]`. Signs follow ISO 8855 and `Sweep`: toe positive toe-in,
 camber negative with the top inwards, caster positive with the top to the rear, motion of a wheel outwards or
 forwards positive; for forces and moments see `TESTS`.
 """

@@ -130,7 +130,7 @@ def read_cases(path: Path) -> Samples:
     found: list[dict[str, Value]] = []
     for line, cells in body:
         if len(cells) != len(keys):
-            raise fail(f"the case has {len(cells)} cells, the header {len(keys)}", line)
+            raise fail(f"the case has {len(cells)} cells, but the header has {len(keys)}", line)
         found.append({})
         for key, cell in zip(keys, cells, strict=True):
             if cell:

@@ -24,7 +24,7 @@ _DEFAULT_TRUNCATION: Final = 3.0
 """Default truncation of a normal distribution, in standard deviations."""
 
 Value = Any
-"""A number, a text, true or false, or a list of these."""
+"""A number, a string, true or false, or a list of these."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def _check_values(factor: Factor, source: Source) -> None:
     where, given, weights = ("factors", factor.key, factor.kind), factor.values, factor.weights
     for value in given:
         if not is_plain(value):
-            raise source.fail(where, f"{shown(value)} is not a number, text, true or false", value)
+            raise source.fail(where, f"{shown(value)} is not a number, string, true or false", value)
     if any(given.count(value) > 1 for value in given):
         raise source.fail(where, "a value is given twice")
     place = ("factors", factor.key, "weights")

@@ -204,7 +204,7 @@ def _cases(given: object, folder: Path, source: Source) -> Samples | None:
     for row in given:
         for key, value in row.items():
             if value is not None and not is_plain(value):
-                raise source.fail(where, f"{shown(value)} of {key} is not a number, text, true or false", value)
+                raise source.fail(where, f"{shown(value)} of {key} is not a number, string, true or false", value)
     return cases(given)
 
 

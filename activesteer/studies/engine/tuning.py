@@ -141,8 +141,8 @@ def tune(
     Every set is driven in all manoeuvres with all controllers.
 
     There is one search, or one for each controller in each manoeuvre if a requirement shall be violated; `controllers`
-    and `maneuvers` choose them, by default those of the file. Each has a folder below the output then. A search found
-    in its folder is resumed, up to `trials` sets in total, or as many as `runs` allows; by default those of the file.
+    and `maneuvers` choose them, by default as in the file. Each then has a folder below the output. A search found
+    in its folder is resumed, up to `trials` sets in total, or as many as `runs` allows; by default as in the file.
     See `study` for the other arguments.
     """
     folder = make_folder(output, StudyError)

@@ -6,7 +6,7 @@ delay of whole decisions, which he knows, and the lag of his arms. One period of
 becomes one matrix. The only approximation is that the motion is small.
 
 The loop is opened at the steering wheel, between the driver's arms and the car, for the crossover frequency and the
-phase margin. The damping is that of the oscillation after a small step of the path.
+phase margin. The damping belongs to the oscillation after a small step of the path.
 
 Source: D. T. McRuer and E. S. Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph 188 (1974).
 """
@@ -222,7 +222,7 @@ def driver_loop(
     rest[heading] += car.timestep_s * yaw_rate
     rest[offset] += car.timestep_s * car.speed_mps * sideslip
     rest[offset, heading] += car.timestep_s * car.speed_mps
-    # The decisions move up by one; the new one enters at the beginning of the period.
+    # The decisions move up by one; the new one enters at the start of the period.
     decides = np.eye(size)
     decides[newest:] = np.eye(size, k=-1)[newest:]
     ahead_s = PREVIEW_INTERVAL_S * np.arange(len(gains.per_path_radpm))
@@ -398,7 +398,7 @@ def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[st
         damping.append(
             Curve([row["speed_kmh"] for row in own], [row["damping"] for row in own], label, look.colour, "-", 1.5)
         )
-        # A run that does not cross the path does not oscillate and has no dot. Dots at one place lie in each other.
+        # A run that does not cross the path does not oscillate and has no dot. Dots at one place are nested.
         swings = [(row["speed_kmh"], row["damping_in_run"]) for row in own if row["damping_in_run"] < 1.0]
         if swings:
             (x, y), size = zip(*swings, strict=True), max(3.0, 9.0 - 3.0 * place)

@@ -168,7 +168,7 @@ def single_track_response(
     """
     time_s = np.asarray(recording.time_s, dtype=np.float64)
     if len(time_s) < 2:
-        raise RecordingError(f"{len(time_s)} samples are too few for a response, at least 2 are needed")
+        raise RecordingError(f"{len(time_s)} samples are too few for a response; at least 2 are needed")
     system = SingleTrack(parameters).state_space(float(np.mean(recording["speed_mps"])))
     front = np.asarray(recording["steering_wheel_rad"]) / steering_ratio + np.asarray(recording["superposition_rad"])
     return outputs_of(system, ("yaw_rate_radps", "sideslip_rad"), time_s, [front, recording["rear_steer_rad"]])

@@ -128,7 +128,7 @@ def round_trip(
         (1.0 / back)[:, None, None] * np.eye(len(car.a)) - car.a, np.asarray(car.b[:, 1:], dtype=np.complex128)
     )
     rows = {name: car.c[index] for index, name in enumerate(OUTPUTS)}
-    # The accelerometer rolls with the body. All signals but the yaw rate are those of the beginning of the step.
+    # The accelerometer rolls with the body. All signals but the yaw rate belong to the start of the step.
     leaning = rows["ay_mps2"] + GRAVITY_MPS2 * rows["roll_rad"]
     through = car.d[OUTPUTS.index("ay_mps2"), 1:]
     motion = np.stack([row @ states for row in (rows["yaw_rate_radps"], leaning, *car.actuators)], axis=1)

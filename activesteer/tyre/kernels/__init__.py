@@ -14,7 +14,7 @@ SI and radians, ISO-W axes at the contact point):
     vx                  speed along the wheel's heading [m/s]
     turn_slip           yaw rate over speed [1/m], positive to the left; MF 6.x only
     d                   rolling direction, 1 forward, -1 backward, between them below walking speed
-    mu                  friction of the road relative to that of the file
+    mu                  friction of the road relative to the friction of the file
     lmux, lmuy, lmu     friction scales, longitudinal and lateral; lmu for the kernel's own force
     fx, fy, mx, my, mz  forces [N] and moments [N m]; fx0, fy0 at pure slip, fy_trail on the trail
     k_x, k_y            slip stiffness [N], cornering stiffness [N/rad]

@@ -20,8 +20,8 @@ Three additions make the states usable from standstill to any speed:
   |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so that a
   sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, separately for
   each axis, so that the formula's steady state is reached exactly within its range of validity.
-* At low speed a viscous term acts beside the spring (Pacejka, eq. 8.129: k_Vlow) and fades out with a cosine. It enters
-  as a slip, so that the friction limit bounds it.
+* At low speed a viscous term acts in addition to the spring (Pacejka, eq. 8.129: k_Vlow) and fades out with a cosine.
+  It enters as a slip, so that the friction limit bounds it.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ def tyre_on_road(
 
     Args:
         p: Record of the tyre, including the side that the tyre is mounted on.
-        mu: Friction of the road relative to that of the tyre file [-].
+        mu: Friction of the road relative to the friction of the tyre file [-].
         pressure_Pa: Inflation pressure [Pa].
         low_speed_mps: Speed below which the standstill terms fade in [m/s].
         low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m].

@@ -173,7 +173,7 @@ def aligning_moment(
 
 
 class SteadyState(NamedTuple):
-    """Results of one evaluation, ISO-W axes at the contact point.
+    """Results of one evaluation, in ISO-W axes at the contact point.
 
     Attributes:
         fx_N: Longitudinal force [N].
@@ -313,7 +313,7 @@ def magic_formula(
         gamma_rad: Camber [rad], positive about +x.
         pressure_Pa: Inflation pressure [Pa].
         vx_mps: Speed of the contact point along the wheel's heading [m/s].
-        mu: Friction of the road relative to that of the file; multiplies LMUX and LMUY, and narrows the curves of
+        mu: Friction of the road relative to the file; multiplies LMUX and LMUY, and narrows the curves of
             combined slip accordingly.
 
     Returns:

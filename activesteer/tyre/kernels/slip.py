@@ -257,7 +257,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
     """Return the relaxation lengths of a rolling tyre for the contact [m].
 
-    A tyre whose file or vehicle says that slip builds up at once has those of a tread block.
+    If file or vehicle say that slip builds up at once, they are the lengths of a tread block.
     """
     if p.RELAXATION_OFF != 0.0:
         return MIN_RELAXATION_LENGTH_M, MIN_RELAXATION_LENGTH_M

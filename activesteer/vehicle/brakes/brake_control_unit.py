@@ -1,7 +1,7 @@
 """One step of the brakes: demand, control unit, speed estimate, traction control, and pressures.
 
 While no brake acts, the wheels that are not driven give the speed. While a brake acts, the fastest wheel is closest to
-the car's speed, and the acceleration is integrated from the last unbraked instant on. The measured acceleration is the
+the car's speed, and the acceleration is integrated from the last unbraked time on. The measured acceleration is the
 specific force along the inclined body; its part from gravity on a slope is learned while the car rolls.
 """
 
@@ -106,7 +106,7 @@ def traction(setup, state, torque_Nm, braked):
     """Make the decisions of traction control: engine limit, motor torques and brake pressures.
 
     The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
-    integral part reduce the drive torque by the excess; the integral starts from the torque at that instant. Of two
+    integral part reduce the drive torque by the excess; the integral starts from the torque at that time. Of two
     wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
     """
     turning, other = 0.0, 0.0

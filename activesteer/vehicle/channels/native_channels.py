@@ -1,6 +1,6 @@
 """Channels computed from raw rows in compiled code.
 
-The code works on a few rows at a time. Raw rows lie one after the other, and so do channels, so the data that the
+The code works on a few rows at a time. Raw rows are contiguous, and so do channels, so the data that the
 processor fetches for one channel is still in its cache for the next.
 """
 

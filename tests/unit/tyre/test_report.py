@@ -76,7 +76,7 @@ def test_an_ordinary_tyre_has_nothing_unusual() -> None:
         ({"QBZ1": 0.0, "QDZ1": 0.0}, "[ALIGNING_COEFFICIENTS] gives none of QBZ1, QDZ1: there is no pneumatic trail"),
         ({"RBX1": 0.0, "RCX1": 0.0}, "combined slip does not reduce the longitudinal force"),
         ({"VXLOW": 8.0}, "VXLOW = 8 m/s"),
-        ({"FNOMIN": 700.0}, "FNOMIN = 700 N: car tyres lie between 1000 and 12000 N"),
+        ({"FNOMIN": 700.0}, "FNOMIN = 700 N: car tyres have 1000 to 12000 N"),
         ({"VERTICAL_STIFFNESS": 2e6, "Q_FZ2": 0.0, "Q_FZ1": 0.0}, "the nominal load deflects the tyre by 0.6 %"),
         ({"UNLOADED_RADIUS": 0.35}, "rim and side wall make"),
         ({"INFLPRES": 300e3}, "INFLPRES is 130 % of NOMPRES: the tyre runs far from the pressure"),

@@ -177,7 +177,7 @@ def test_a_tyre_that_is_too_small(damaged: Damage, tmp_path: Path) -> None:
         (r'(name="chassis">\s+<freejoint.*/>\s+<!--.*-->\s+<inertial pos="[^"]*" mass=)"1266.6"', r'\1"2600"'),
     )
     assert report["front highest valid load over the static load"].level == "warning"
-    assert report["mass that controllers know, against that of the model"].level == "warning"
+    assert report["mass that controllers know, compared with the model"].level == "warning"
 
 
 def test_a_car_that_does_not_exist(tmp_path: Path) -> None:

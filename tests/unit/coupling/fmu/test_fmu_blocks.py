@@ -222,7 +222,7 @@ def test_an_archive_cannot_write_outside_of_its_folder_or_fill_the_disk(fmus, tm
             controller_spec(fmu)
     monkeypatch.setattr("activesteer.core.limits.MAX_FMU_UNPACKED_BYTES", 10_000)
     fmu = changed(fmus / "yaw_damper_fmi2.fmu", tmp_path / "x.fmu", added=[("resources/zeros", bytes(100_000))])
-    with pytest.raises(ControllerError, match="unpacked bytes, at most 10000"):
+    with pytest.raises(ControllerError, match="unpacked bytes; at most 10000"):
         controller_spec(fmu)
     (tmp_path / "x.fmu").write_bytes((fmus / "yaw_damper_fmi2.fmu").read_bytes()[:-100])
     with pytest.raises(ControllerError, match="is not an FMU"):

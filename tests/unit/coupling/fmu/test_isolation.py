@@ -1,4 +1,4 @@
-"""An isolated FMU that answers nonsense is a fault."""
+"""An isolated FMU that returns invalid data is a fault."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_step_needs_as_many_numbers_as_the_fmu_has_outputs(monkeypatch: pytest
     monkeypatch.setattr(Answers, "answer", b"0" + struct.pack("=2d", 1.0, 2.0))
     assert isolated.step((0.0, 0.0)) == (1.0, 2.0)
     monkeypatch.setattr(Answers, "answer", answer)
-    with pytest.raises(FmuFault, match="answers"):
+    with pytest.raises(FmuFault, match=r"returns invalid data|answers too much"):
         isolated.step((0.0, 0.0))
 
 
@@ -50,5 +50,5 @@ def test_a_saved_state_has_a_number(monkeypatch: pytest.MonkeyPatch, answer: byt
     monkeypatch.setattr(Answers, "answer", b"07")
     assert isolated.save() == 7
     monkeypatch.setattr(Answers, "answer", answer)
-    with pytest.raises(FmuFault, match="answers nonsense"):
+    with pytest.raises(FmuFault, match="returns invalid data"):
         isolated.save()
