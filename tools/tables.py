@@ -70,8 +70,8 @@ def around_setting() -> list[str]:
         return []
     samples = found[0].samples if found[0] else 0
     lines = [
-        f"Each cell gives the per cent of {samples} samples with the 95 % interval. The two values after the semicolon "
-        "are for ideal and for production sensors.",
+        f"Each cell gives the percentage of {samples} samples in which the claim holds, with its 95 % interval. The "
+        "two values after the semicolon are for ideal and for production sensors.",
         "",
         "| | paper's setting | car, road and speed vary | driver, cones, gains, band and reference vary too |",
         "|---|---|---|---|",
