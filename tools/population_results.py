@@ -22,7 +22,7 @@ from activesteer.analysis.harm import changes as growth_of
 from activesteer.core.conventions import Array
 from activesteer.core.files import finite, reading
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
-from activesteer.core.units import DisplayUnit, display_unit
+from activesteer.core.units import DisplayUnit, display_unit, parameter_label
 from activesteer.errors import ManeuverError, ModelError, ParameterError, StudyError
 from activesteer.resources import studies_dir
 from activesteer.scenario import FileOrTable, resolve
@@ -226,13 +226,16 @@ class ClaimProportion:
 
     @property
     def words(self) -> str:
-        """The factor in words, or empty without a factor."""
+        """Value or direction of the factor at which the claim holds more often, empty without a factor."""
         if self.depends_on == NO_FACTOR:
             return ""
-        choices = {name: value for name, value in self.at.items() if name.startswith(f"{self.depends_on} = ")}
-        if choices:
-            return f"with {max(choices, key=lambda name: choices[name])}"
-        return f"{('in the middle or at the ends of', 'with more', 'with less')[self.direction]} {self.depends_on}"
+        if choices := {name: share for name, share in self.at.items() if name.startswith(f"{self.depends_on} = ")}:
+            key, _, value = max(choices, key=lambda name: choices[name]).partition(" = ")
+            return f"{value} {key.removesuffix('.preset')}"
+        label = parameter_label(self.depends_on)[0].replace(": ", " ")
+        if not self.direction:
+            return f"{label} in the middle or at the ends of its range"
+        return f"{'higher' if self.direction > 0 else 'lower'} {label}"
 
 
 def read_claims(table: Mapping[str, Any]) -> tuple[ClaimProportion, ...]:

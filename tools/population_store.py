@@ -94,7 +94,7 @@ The fraction comes from a regression on each factor and its square. The cell is 
 
 Claims without a driver are about open-loop manoeuvres, in which the steering wheel follows a table.
 
-| | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | more often |
+| | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | holds more often with |
 |---|---|---|---|---|---|---|---|---|
 """
 _SYSTEMS: Final = """

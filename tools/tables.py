@@ -22,11 +22,10 @@ from activesteer.analysis.claims.judge import SCENARIO_OF, SCENARIOS, STATEMENTS
 from activesteer.analysis.claims.scorecard import PAPER, not_reproduced, read_setting
 from activesteer.config import Range, dataclass_in, element_of, spellings
 from activesteer.controllers import load_controller
-from activesteer.core.units import parameter_label
 from activesteer.maneuver import KINDS
 from activesteer.maneuver.base import Maneuver
 from tools.make_setting import AROUND
-from tools.population_results import NO_FACTOR, ClaimProportion, Population, read_population
+from tools.population_results import Population, read_population
 from tools.proportions import percent
 
 DOCS: Final = Path(__file__).parents[1] / "docs"
@@ -117,17 +116,7 @@ def _proportion(population: Population | None, number: str) -> tuple[str, str, s
         return "", "", ""
     interval = f"{percent(found.low)} to {percent(found.high)}"
     sensors = ", ".join(percent(found.at[f"{SENSORS} = {preset}"]) for preset in PRESETS)
-    return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, _condition(found)
-
-
-def _condition(found: ClaimProportion) -> str:
-    """Return the value or direction of the strongest factor at which a claim holds more often."""
-    if found.depends_on == NO_FACTOR:
-        return ""
-    if found.depends_on == SENSORS:
-        return f"{max(PRESETS, key=lambda preset: found.at[f'{SENSORS} = {preset}'])} sensors"
-    label = parameter_label(found.depends_on)[0].replace(": ", " ")
-    return (f"{label} in the middle or at the ends of its range", f"higher {label}", f"lower {label}")[found.direction]
+    return f"{found.verdict.value}: {percent(found.share)} ({interval})", sensors, found.words
 
 
 CLAIMS_PARTS: Final = {

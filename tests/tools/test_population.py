@@ -124,7 +124,7 @@ def test_the_factor_that_decides_is_named() -> None:
     speed, always = summarise(table, planned, nominal(Z1=True, Z2=True)).claims
     assert (speed.depends_on, speed.direction, speed.verdict) == ("speed_kmh", 1, ProportionVerdict.DEPENDS)
     assert (always.depends_on, always.verdict) == (NO_FACTOR, ProportionVerdict.HOLDS)
-    assert speed.words == "with more speed_kmh"
+    assert speed.words == "higher speed"
 
 
 def test_a_choice_that_decides_is_named_with_its_value_and_shares() -> None:
@@ -133,7 +133,7 @@ def test_a_choice_that_decides_is_named_with_its_value_and_shares() -> None:
     [ideal] = summarise(table, planned, nominal(Z3=True)).claims
     assert ideal.share == 0.5
     assert ideal.at == {"sensors.preset = ideal": 1.0, "sensors.preset = production": 0.0}
-    assert ideal.words == "with sensors.preset = ideal"
+    assert ideal.words == "ideal sensors"
 
 
 def test_what_is_stored_is_what_was_found(serial: Path) -> None:
