@@ -21,8 +21,9 @@ lateral acceleration is expected from its values at u and at sqrt(3) standard de
 
     slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
 
-A friction that jumps further than this range would be taken for soft tyres all the same. So a value with a surprising
-error says nothing about the stiffness, and `reopen` makes the friction unknown again (see `advance`).
+A friction that jumps further than this range would be taken for soft tyres or for an offset of the accelerometer all
+the same. So a value with a surprising error says nothing about stiffness and offset, and `reopen` makes the friction
+unknown again (see `advance`).
 
 Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
@@ -80,8 +81,9 @@ _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
 make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does not know; this is three times as much."""
 _SURPRISING: Final = 4.0
-"""Squared error over its expected variance above which a value is not used for the stiffness: two standard
-deviations. Something else has then changed."""
+"""Squared error over its expected variance above which a value is not used for the stiffness and for the offset of the
+accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
+offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by a tenth."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to that of the front tyres, on a new road: for a tenth
 of a second one axle stands on the old one. Of 0.1, 0.2 and 0.3, chosen by the error of the sideslip angle."""
@@ -261,7 +263,8 @@ def _over_friction(known, tyres, memory, here_mps2):
 def _take_in(state, covariance, row, error, variance):
     """Process one measured value, and return the expected variance of its error.
 
-    A stiffness without a slip angle that shows it has no gain; its uncertainty counts (Schmidt's filter).
+    A stiffness without a slip angle that shows it, or an offset that would have to jump, has no gain; its uncertainty
+    counts (Schmidt's filter).
     """
     n = len(state)
     spread, expected = np.zeros(n), variance
@@ -271,14 +274,15 @@ def _take_in(state, covariance, row, error, variance):
     for i in range(n):
         expected += row[i] * spread[i]
     surprising = error * error > _SURPRISING * expected
-    front_hidden = surprising or abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD
-    rear_hidden = surprising or abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
+    hidden = np.zeros(n, np.bool_)
+    hidden[AY_OFFSET] = surprising
+    hidden[FRONT_STIFFNESS] = surprising or abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD
+    hidden[REAR_STIFFNESS] = surprising or abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
     for i in range(n):
-        hidden = (i == FRONT_STIFFNESS and front_hidden) or (i == REAR_STIFFNESS and rear_hidden)
-        if not hidden:
+        if not hidden[i]:
             state[i] += spread[i] / expected * error
         for k in range(i + 1):
-            if hidden and (k == i or (k == FRONT_STIFFNESS and front_hidden)):
+            if hidden[i] and hidden[k]:
                 continue
             covariance[i, k] -= spread[i] * spread[k] / expected
             covariance[k, i] = covariance[i, k]

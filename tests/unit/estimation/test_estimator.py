@@ -200,6 +200,20 @@ def test_the_friction_behind_snow_is_as_wrong_as_it_is_said_to_be(seed):
     assert (error < 2.0 * run["estimated_friction_std"][behind]).mean() > 0.9
 
 
+def test_the_edge_of_snow_is_not_taken_for_an_offset_of_the_accelerometer():
+    """The offset took 0.54 m/s2, so the friction of worn front tyres was 0.60 +- 0.05 where 0.70 is true."""
+    worn = {"factors.front_tyre_friction": 0.70, "factors.rear_tyre_friction": 0.88}
+    road = {"road.mu": 0.99, "road.patches.0.mu": 0.22, "speed_kmh": 71.5, "duration_s": 7.0}
+    changes = {"sensors.preset": "production", "sensors.seed": 12, **worn, **road}
+    run = simulate("mu_jump", "integrated", "compact", changes, driver="expert")
+    mu = np.array([run[f"{corner}_mu"] for corner in ("fl", "fr", "rl", "rr")])
+    behind = run.time_s > run.time_s[(mu < 0.5).any(axis=0)][-1] + 0.3
+    assert (run["ay_mps2"][behind] > 5.0).mean() > 0.5
+    error = np.abs(run["estimated_friction"] - 0.70 * 0.99)[behind]
+    assert np.sqrt(np.mean(error**2)) < 0.05
+    assert (error < 2.0 * run["estimated_friction_std"][behind]).mean() > 0.9
+
+
 @pytest.mark.parametrize("vehicle", ["sedan", "compact"])
 def test_the_model_has_the_slip_angles_of_a_rolling_car(vehicle):
     """With the true motion. The sedan's tyres feel the slip of their wheel centres: the error was 0.21 deg."""

@@ -305,12 +305,19 @@ def test_the_way_to_the_present_is_as_long_as_the_sample_is_old(known, memory, s
     assert (calls > 0) == (abs(moved) > 1e-3)
 
 
-def test_lateral_acceleration_says_nothing_of_the_offset_of_the_yaw_rate_sensor(known, memory, setup):
+@pytest.mark.parametrize(("ay_mps2", "learns"), [(0.1, True), (2.0, False)])
+def test_lateral_acceleration_shows_the_offset_of_its_own_sensor_unless_it_is_a_surprise(
+    known, memory, setup, ay_mps2, learns
+):
+    """An offset does not jump: at the edge of snow, a single sample moved it by six standard deviations."""
     tyres, deaf = np.array([tyre.force_N for tyre in setup.estimation.tyres]), known.copy()
     deaf["rate_variance_rad2ps2"] = 1e12
     memory["speed_mps"] = 20.0
-    correct(deaf, tyres, memory, 0.0, 2.0, 0.01)
-    assert memory.state[AY_OFFSET] > 1e-4
+    memory["covariance"][AY_OFFSET, AY_OFFSET] = known.ay_offset_std_mps2**2
+    before = memory.covariance[AY_OFFSET, AY_OFFSET]
+    correct(deaf, tyres, memory, 0.0, ay_mps2, 0.01)
+    assert (memory.state[AY_OFFSET] > 1e-4) == learns
+    assert (memory.covariance[AY_OFFSET, AY_OFFSET] < before) == learns
     assert memory.state[RATE_OFFSET] == pytest.approx(0.0, abs=1e-12)
 
 
