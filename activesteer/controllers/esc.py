@@ -1,4 +1,4 @@
-"""Electronic stability control with the brakes of single wheels (FMVSS 126).
+"""Electronic stability control with the brakes of individual wheels (FMVSS 126).
 
 S4 of the standard requires brake torques at single wheels that make a yaw moment; yaw rate, sideslip and the driver's
 angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
@@ -82,7 +82,7 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
 def wheel_torques(
     moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
 ) -> tuple[float, float, float, float]:
-    """Return the brake torques for a yaw moment by one wheel, order of `CORNERS` [Nm].
+    """Return the brake torques for a yaw moment by one wheel, in the order of `CORNERS` [Nm].
 
     Args:
         moment_Nm: Yaw moment, left positive [Nm].

@@ -41,7 +41,7 @@ from activesteer.core.signals import NO_TORQUES, ActuatorCommand, DriverCommand,
 from activesteer.errors import ControllerError
 
 _SIDES: Final = (-1.0, 1.0, -1.0, 1.0)
-"""Sign of a torque that turns the car to the left, order of `CORNERS`."""
+"""Sign of a torque that turns the car to the left, in the order of `CORNERS`."""
 _FREE_SLIP: Final = 0.03
 """Slip up to which a wheel gets all of its torque [-]: the slip of a rear wheel of the compact at 1.7 kN."""
 _MOST_SLIP: Final = 0.06

@@ -33,7 +33,7 @@ new_message: Final = cast(_Make, tuple.__new__)
 CORNERS_IN_WORDS: Final = dict(zip(CORNERS, ("front left", "front right", "rear left", "rear right"), strict=True))
 """Corner -> its name in a sentence."""
 PerWheel: TypeAlias = tuple[float, float, float, float]
-"""One number for each wheel, order of `CORNERS`."""
+"""One number for each wheel, in the order of `CORNERS`."""
 
 
 class Channel(NamedTuple):
@@ -173,7 +173,7 @@ def arrays_of(kind: type[_Message], rows: Any) -> _Message:
 
 
 class WheelTorques(NamedTuple):
-    """Torques of the individual wheels, order of `CORNERS`.
+    """Torques of the individual wheels, in the order of `CORNERS`.
 
     Attributes:
         drive_Nm: Drive torques, forward positive [Nm].
@@ -255,8 +255,8 @@ class Measurement(NamedTuple):
         steering_wheel_rad: Steering wheel angle [rad], left positive.
         rear_steer_rad: Angle of the rear steering actuators, mean of both [rad], left positive.
         superposition_rad: Angle added by the front superposition, at the road wheels [rad].
-        wheel_speed_radps: Rotational speeds of the four wheels [rad/s], order of `CORNERS`.
-        brake_pressure_Pa: Pressures in the four wheel brakes [Pa], order of `CORNERS`.
+        wheel_speed_radps: Rotational speeds of the four wheels [rad/s], in the order of `CORNERS`.
+        brake_pressure_Pa: Pressures in the four wheel brakes [Pa], in the order of `CORNERS`.
     """
 
     time_s: float

@@ -10,7 +10,7 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     b_y     offset of the lateral accelerometer, likewise
     g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not feel it
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
-    w       friction of the rear tyres relative to that of the front tyres, likewise, about 1 for `stiffness_s`
+    w       friction of the rear tyres relative to the front tyres, likewise, about 1 for `stiffness_s`
     b_r     offset of the yaw rate sensor, a random walk
     forces  errors of `force_std_N` + `force_fraction` |F| for `force_s`, longitudinal errors of `along_fraction` |X|
     noise   of lateral and yaw acceleration
@@ -85,7 +85,7 @@ _SURPRISING: Final = 4.0
 accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
 offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by a tenth."""
 _NEW_RATIO_STD: Final = 0.3
-"""Standard deviation of the friction of the rear tyres relative to that of the front tyres, on a new road: for a tenth
+"""Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth
 of a second one axle stands on the old one. Of 0.1, 0.2 and 0.3, chosen by the error of the sideslip angle."""
 SLIDING_S: Final = 0.3
 """Time for which a wheel that has slid counts as sliding, and duration of the error of the friction that it shows [s]:

@@ -32,7 +32,7 @@ class EstimatorParameters:
     friction_std: _Positive = 0.25
     """Standard deviation of this friction: wet asphalt, 0.6, is likely enough; snow, 0.3, is possible."""
     rear_ratio_std: _Positive = 0.1
-    """Standard deviation of the friction of the rear tyres relative to that of the front tyres: other tyres, wear.
+    """Standard deviation of the friction of the rear tyres relative to the front tyres: other tyres, wear.
     Chosen."""
     friction_fraction: _NotNegative = 0.05
     """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright. At
@@ -142,7 +142,7 @@ class EstimatorSetup:
         two_track: Parameters of wheel loads and body roll.
         steering_ratio: Steering wheel angle over road-wheel angle [-].
         tyres: Tyre of the front and of the rear axle.
-        drive_fractions: Fraction of the drive torque at each wheel, order of `CORNERS`.
+        drive_fractions: Fraction of the drive torque at each wheel, in the order of `CORNERS`.
         brake_torque_per_pressure_NmpPa: Brake torque per pressure of each wheel [Nm/Pa].
         drag_per_speed2_kgpm: Drag over the square of the speed [kg/m].
         sensors: Data sheets of the sensors.
@@ -167,6 +167,6 @@ class EstimatorSetup:
 
     @property
     def rolling_radius_m(self) -> tuple[float, float, float, float]:
-        """Rolling radius of each wheel [m], order of `CORNERS`."""
+        """Rolling radius of each wheel [m], in the order of `CORNERS`."""
         front, rear = self.tyres
         return front.rolling_radius_m, front.rolling_radius_m, rear.rolling_radius_m, rear.rolling_radius_m
