@@ -11,8 +11,8 @@ const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 const LEAST_CONE = 2, CARS_APART = 110;
 // Least height of a track to one scale [px]; stretch beyond which no car is drawn along it.
 const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
-// Instants of the slider.
-const INSTANTS = 1000;
+// Instants of the slider; most values at a plot if those of dotted lines are among them.
+const INSTANTS = 1000, MOST_TOLD = 6;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
 const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 170, PRINTED_MOST = 920;
 

@@ -24,7 +24,7 @@ from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
 from tests.raising import raises
-from tests.unit.analysis.synthetic import along_path, step_steer
+from tests.unit.analysis.synthetic import along_path, offset_track, step_steer
 from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers
 from tests.unit.playback.synthetic import circle
 
@@ -294,6 +294,25 @@ def test_track_has_lanes_cones_and_path(page):
     assert (track["path"]["x"][-1] > 400.0, track["path"]["y"][-1]) == (True, 0)  # straight on
     assert track["tracks"][1]["run"] == 1
     assert track["view"]["x"] == [10.0, 205.0]
+
+
+def test_the_track_of_a_car_that_leaves_its_course_is_shown_as_a_whole():
+    away = recording_of(along_path(lambda x: 0.3 * x, path=offset_track), maneuver={"name": "lane_change"})
+    stays = recording_of(along_path(), maneuver={"name": "lane_change"})
+    alone = data_of(report_page({"a.mcap": away}))[0]["track"]
+    assert alone["view"] is None
+    assert alone["whole"]["y"][1] == pytest.approx(max(y for y in alone["tracks"][0]["y"] if y is not None), abs=0.1)
+    assert alone["whole"]["x"][1] >= 205.0  # the course too
+    both = data_of(report_page({"a.mcap": away, "b.mcap": stays}))[0]["track"]
+    assert both["view"]["y"][1] < 15.0  # the other car keeps its details
+
+
+def test_events_name_their_run_only_among_several():
+    run, other = recording_of(step_steer()), recording_of(step_steer())
+    run.metadata["events"] = [{"time_s": 1.0, "kind": "parameter", "what": "road.mu = 0.3"}]
+    assert "Events: road.mu = 0.3 at 1 s" in Page(report_page({"a.mcap": run})).words
+    page = report_page({"a.mcap": run, "b.mcap": other})
+    assert f"Events: {data_of(page)[0]['runs'][0]['label']}: road.mu" in Page(page).words
 
 
 def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
