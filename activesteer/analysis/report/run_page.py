@@ -315,7 +315,7 @@ MAX_FIGURES: Final = 6
 """Largest number of key figures that can be read quickly."""
 
 
-HEADLINE: Final = "Peak sideslip [deg]"
+HEADLINE: Final = "Largest sideslip angle [deg]"
 """Title of the key figure that is shown where there is room for only one."""
 
 

@@ -359,7 +359,7 @@ def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     page = used(
         tmp_path,
-        """const of = (lost, value) => [{ title: "Peak sideslip", unit: "deg", value, digits: null, lost }];
+        """const of = (lost, value) => [{ title: "Largest sideslip angle", unit: "deg", value, digits: null, lost }];
         const id = sent.at(-1)?.id ?? before.at(-1).id;
         hear({ kind: "run", id, name: "none", title: "", figures: of(true, null), losses: [] }, [undefined]);
         hear({ kind: "run", id, name: "ars", title: "", figures: of(true, null), losses: [] }, [undefined]);
