@@ -46,6 +46,7 @@ function describe(ticked) {
   if (ticked) state.wanted = state.values;
   else curves.whole();
   usable(false);
+  $("state").textContent = "driving …";
   $("sliders").inert = $("reset").disabled = true; // those of the choice before
   state.values = {};
   state.runs = new Map();
@@ -261,7 +262,7 @@ function showTitle(title) {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value, lost }) => value != null || lost).map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: difference from ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);

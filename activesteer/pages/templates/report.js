@@ -72,7 +72,7 @@
       const title = [element("b", {}, panel.title), element("span", { class: "quiet" }, `${panel.unit}${panel.note ? ", " + panel.note : ""}`)];
       const [holder, values] = this.figure(title, "", `${panel.title} over time`);
       const lines = panel.series.map((series) => ({
-        stroke: () => this.colour(series.run), points: { show: false },
+        stroke: () => this.colour(series.run), points: { show: false }, gaps: wideGaps,
         width: series.dotted ? 1.2 : lineWidth(series.run), dash: series.dotted ? [1.5, 3] : dashed(runs[series.run], 1.5), cap: "butt",
       }));
       const plot = new uPlot({

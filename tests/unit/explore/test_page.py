@@ -207,6 +207,13 @@ def test_a_controller_beyond_the_limit_is_unticked_and_named(
     assert result == [unticked, unticked]
 
 
+def test_a_jump_between_two_neighbouring_values_is_a_gap_that_can_be_seen(tmp_path: Path) -> None:
+    shared = (Path(str(resources.files("activesteer.pages"))) / "templates" / "touch.js").read_text("utf-8")
+    gaps = "wideGaps(null, 1, 0, 9, [[10, 10], [40, 60]])"
+    wide = script(tmp_path, f"globalThis.devicePixelRatio = 1;\n{shared}\nconsole.log(JSON.stringify({gaps}));")
+    assert wide == [[8, 12], [38, 62]]
+
+
 def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path) -> None:
     values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null], [7000000, 0], [1234.5, 1]]"
     texts = script(tmp_path, f"console.log(JSON.stringify({values}.map(([value, digits]) => number(value, digits))));")
