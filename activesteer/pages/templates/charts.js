@@ -104,7 +104,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length > this.panel.names.length ? 40 : NARROW.matches ? 35 : 30)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length > this.panel.names.length ? 40 : NARROW.matches ? 35 : 30)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : NARROW.matches ? PLOT_HEIGHT : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
