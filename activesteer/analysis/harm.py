@@ -68,7 +68,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
     """Describe the failures of a run with these metrics."""
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
-        yield f"lost: {math.degrees(peak):.0f} deg of peak sideslip" if math.isfinite(peak) else "lost"
+        yield f"lost: sideslip angle of {math.degrees(peak):.0f} deg" if math.isfinite(peak) else "lost"
     if STAYS_IN_LANES in metrics and metrics[STAYS_IN_LANES] != 1.0:
         beyond = metrics.get(LANE_OVERSTEP, math.nan)
         yield f"leaves the lane by {beyond:.2f} m" if beyond > 0.0 else "does not get through the lanes"

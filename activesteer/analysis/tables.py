@@ -16,9 +16,9 @@ Paint = Callable[[str, str, float, float, str], str]
 """Function from label of a run, name of a metric, its value in this and in the first run, and its text to the text
 as shown."""
 
-TYRE_USE_NOTE: Final = (
-    "tyre use is the force of a tyre relative to its longitudinal and lateral peaks at pure slip; combined slip and "
-    "shifts of the tyre file let it exceed 1"
+_FRICTION_NOTE: Final = (
+    "friction utilisation is the force of a tyre relative to its longitudinal and lateral peaks at pure slip; "
+    "combined slip and shifts of the tyre file let it exceed 1"
 )
 
 
@@ -35,13 +35,15 @@ def comparison(runs: Mapping[str, Mapping[str, float]], paint: Paint | None = No
             if paint is not None and place and name in metrics and name in first and LOST not in numbers:
                 numbers[place] = paint(run, name, metrics[name], first[name], numbers[place])
         rows.append([metric.label, metric.unit.name, *numbers])
-    return "\n".join((*text_table(rows, text=2, repeat=2, least=8), *notes(runs)))
+    return "\n".join(
+        (*text_table(rows, text=2, repeat=2, least=8), *(line for note in notes(runs) for line in wrapped_line(note)))
+    )
 
 
 def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return explanations of values that a reader may mistake for errors."""
     above = any(metrics.get(name, 0.0) > 1.0 for metrics in runs.values() for name in FRICTION_UTILISATION)
-    return wrapped_line(TYRE_USE_NOTE) if above else []
+    return [_FRICTION_NOTE] if above else []
 
 
 _NEAR_SHARE: Final = 0.005

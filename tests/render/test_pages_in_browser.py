@@ -173,6 +173,25 @@ def test_a_phone_shows_every_kind_of_panel_and_a_row_as_a_card(shown, tmp_path):
     assert box["width"] <= 390.0
 
 
+def test_few_results_stay_in_a_row_on_a_phone(shown, tmp_path):
+    table = Table("", ["Run", "Largest yaw rate", "Final heading"], [["a", "1.0", "2.0"]], kind="results", numbers=2)
+    picture = Picture("", [Panel("x [m]", "y [m]", [Curve([0.0, 1.0], [0.0, 1.0])])])
+    sections = [Section("Part", [], [table], pictures=[picture])]
+    page = shown(write_page(Page("all", "Few", [], sections), tmp_path / "f.html"), **PHONE)
+    cells = page.locator("tbody td").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().toJSON())")
+    assert cells[0]["top"] == cells[1]["top"]
+    assert cells[0]["right"] <= cells[1]["left"]
+
+
+@pytest.mark.parametrize(("x", "rows"), [("travel [mm]", 2), ("time [s]", 3)])
+def test_many_plots_stand_four_in_a_row_unless_they_are_over_time(shown, tmp_path, x, rows):
+    panels = [Panel(x, "toe [deg]", [Curve([0.0, 1.0], [0.0, 1.0])]) for _ in range(6)]
+    sections = [Section("Part", pictures=[Picture("", panels)])]
+    page = shown(write_page(Page("all", "Many", [], sections), tmp_path / "m.html"), **DESK)
+    tops = page.locator("figure").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert len(set(tops)) == rows
+
+
 def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     told = page.evaluate("[-0.001, -0.01, 0, null, -1234.5].map(shown)")

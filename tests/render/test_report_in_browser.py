@@ -141,7 +141,7 @@ def test_first_screen_says_what_came_out(open_page):
     # Inner text is what is shown; the first paragraphs say what was run.
     for words in (
         "vehicle synthetic",
-        "lost: 46 deg of peak sideslip, leaves the lane by 1.20 m, hits 2 cones",
+        "lost: sideslip angle of 46 deg, leaves the lane by 1.20 m, hits 2 cones",
         "stays in the lanes",
     ):
         box = page.get_by_text(words).first.bounding_box()
@@ -199,8 +199,8 @@ def test_cursor_is_in_all_plots_at_once_and_tells_the_values(open_page):
     hover(page, plot(page, "Yaw rate"), 6.0 / DURATION_S)
     time_s, *values = told(plot(page, "Yaw rate"))
     assert float(time_s) == pytest.approx(6.0, abs=0.02)
-    # 0.2, 0.17, 0.14 rad/s
-    assert [float(value) for value in values] == pytest.approx([11.5, 9.74, 8.02], abs=0.06)
+    # 0.2, 0.17, 0.14 rad/s, and what each desires
+    assert [float(value) for value in values] == pytest.approx([11.5, 11.5, 9.74, 9.74, 8.02, 8.02], abs=0.06)
     other = plot(page, "Lateral acceleration")
     assert told(other)[0] == time_s
     assert float(told(other)[1]) == pytest.approx(4.0, abs=0.01)

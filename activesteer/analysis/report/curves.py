@@ -28,7 +28,7 @@ MAX_SAMPLES: Final = 4000
 MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
-"""Distance from the course up to which the plot shows a car that leaves it [m]."""
+"""Distance from the course up to which the plot shows a car that leaves it while another one stays [m]."""
 BESIDE_M: Final = 60.0
 """Distance from the tracks up to which areas of a different friction and obstacles are drawn [m]."""
 DIGITS: Final = 4
@@ -187,13 +187,20 @@ def _road(group: Group, tracks: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def _course(course: Course, group: Group) -> dict[str, Any]:
     view = view_of(course)
     hit = struck_cones([run.recording for run in group.runs], course)
-    low, high = view.y_m
+    low, high = least, most = view.y_m
+    tracks = []
     for run in group.runs:
         with suppress(RecordingError):
             x, y = front_axle(run.recording)
+            tracks.append(np.stack([x, y])[:, np.isfinite(x) & np.isfinite(y)])
             seen = y[(x >= view.x_m[0]) & (x <= view.x_m[1]) & np.isfinite(y)]
-            low = min(low, max(seen.min(initial=low), view.y_m[0] - OFF_COURSE_M))
-            high = max(high, min(seen.max(initial=high), view.y_m[1] + OFF_COURSE_M))
+            low = min(low, max(seen.min(initial=low), least - OFF_COURSE_M))
+            high = max(high, min(seen.max(initial=high), most + OFF_COURSE_M))
+    # Without a car that stays near the course, its details matter less than where all cars go.
+    left = all(
+        y.min(initial=least) < least - OFF_COURSE_M or y.max(initial=most) > most + OFF_COURSE_M for _, y in tracks
+    )
+    x, y = np.column_stack([*tracks, [view.x_m, view.y_m]])
     return {
         "lanes": [
             {"name": name, "x": [start, end], "y": [below, above]} for name, start, end, below, above in course.lanes
@@ -204,5 +211,6 @@ def _course(course: Course, group: Group) -> dict[str, Any]:
         ],
         "cone_radius": CONE_RADIUS_M,
         "path": {"x": _rounded(view.path_x_m, 2), "y": _rounded(view.path_y_m, 3)},
-        "view": {"x": list(view.x_m), "y": [float(low), float(high)]},
+        "view": None if left else {"x": list(view.x_m), "y": [float(low), float(high)]},
+        "whole": {"x": [float(x.min()), float(x.max())], "y": [float(y.min()), float(y.max())]},
     }

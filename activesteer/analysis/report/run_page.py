@@ -252,11 +252,12 @@ def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
 
 def _events(group: Group) -> list[str]:
     """Return the events during the runs, one line for each run."""
-    listed = {run.name: events_of(run.recording.metadata) for run in group.runs}
+    several = len(group.runs) > 1
+    listed = {f"{run.look.label}: " * several: events_of(run.recording.metadata) for run in group.runs}
     return [
-        f"{name}: {', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
+        f"{label}{', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
         + (f" and {len(events) - _MOST_EVENTS} more" if len(events) > _MOST_EVENTS else "")
-        for name, events in listed.items()
+        for label, events in listed.items()
         if events
     ]
 
@@ -314,7 +315,7 @@ MAX_FIGURES: Final = 6
 """Largest number of key figures that can be read quickly."""
 
 
-HEADLINE: Final = "Peak sideslip [deg]"
+HEADLINE: Final = "Largest sideslip angle [deg]"
 """Title of the key figure that is shown where there is room for only one."""
 
 

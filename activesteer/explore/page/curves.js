@@ -163,7 +163,7 @@ export class Curves {
       cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [{ ...axis(30, " s"), gap: 8 }, axis(44)],
-      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, points: { show: false } }))],
+      series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, gaps: wideGaps, points: { show: false } }))],
       hooks: { drawAxes: [(u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
         const i = u.cursor.idx;
         const valueOf = (line, k) => element("span", { style: `border-bottom: 2px ${line.dotted ? "dotted" : "solid"} ${runColour(line.place)}` }, number(u.data[k + 1][i]));

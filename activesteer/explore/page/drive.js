@@ -313,7 +313,7 @@ export class Drive {
     if (header.controller !== this.controlled) { this.controlled = header.controller; this.rear = this.front = false; }
     this.rear ||= header.rear_deg != null;
     this.front ||= header.superposition_deg != null;
-    const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = this.ghost?.lap_s;
+    const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = (this.rounds && header.last_lap_s) || this.ghost?.lap_s;
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(Math.min(100, 100 * header.friction_use), 0)} %`,
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
@@ -331,7 +331,7 @@ export class Drive {
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
-    $("gauges").title = "grip used: share of its friction that the busiest tyre uses; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the ghost; missed: a gate was missed" : "");
+    $("gauges").title = "grip used: share of its friction that the busiest tyre uses; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the last lap or of the ghost; missed: a gate was missed" : "");
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 

@@ -46,6 +46,8 @@ function describe(ticked) {
   if (ticked) state.wanted = state.values;
   else curves.whole();
   usable(false);
+  $("state").textContent = "driving …";
+  $("sliders").inert = $("reset").disabled = true; // those of the choice before
   state.values = {};
   state.runs = new Map();
   state.ghosts = new Map();
@@ -150,6 +152,7 @@ const hear = {
     state.addressed = false;
     if (told.length) say(told.join(" "), true);
     state.wanted = {};
+    $("sliders").inert = false;
     showSliders();
     scene.setShape(header.shape, arrays);
     // A driver follows a path; an own one may do more.
@@ -259,7 +262,7 @@ function showTitle(title) {
 function showFigures() {
   showColours();
   const runs = [...state.runs.values()].filter((run) => run.figures), known = new Map(runs.flatMap((run) => run.figures.filter(({ value, lost }) => value != null || lost).map((figure) => [figure.title, figure])));
-  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: against ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
+  const head = element("tr", {}, element("th", { class: "quiet" }, state.ghosts.size ? "small: change since the pale curves" : runs.length > 1 ? `small: difference from ${shortName(runs[0])}` : ""), ...runs.map((run) => element("th", {}, swatchOf(run), shortName(run))));
   const rows = [...known.values()].map(({ title, unit }) => element("tr", {}, element("th", {}, title, element("span", { class: "quiet" }, ` ${unit}`)), ...runs.map((run) => {
     const of = (other) => other?.figures?.find((figure) => figure.title === title), now = of(run), before = of(state.ghosts.size ? state.ghosts.get(run.name) : runs[0]);
     const change = now?.value != null && before?.value != null ? now.value - before.value : 0, shown = number(change, now?.digits);
@@ -300,18 +303,33 @@ const BIGGER = { Pa: [1e-6, "MPa"], "N/m": [1e-3, "kN/m"] };
 const wayOf = (event) => ({ ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 })[event.key];
 
 function sliderOf(slider) {
-  const shown = element("output", {}), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": `${slider.group}: ${slider.label}`, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
-  const box = element("div", { class: "slider" }, element("span", {}, slider.label), shown, input);
+  const shown = element("input", { class: "value", inputmode: "decimal", autocomplete: "off", "aria-label": `${slider.group}: ${slider.label}, value` }), input = element("input", { type: "range", min: slider.low, max: slider.high, step: "any", "aria-label": `${slider.group}: ${slider.label}`, "data-key": slider.key, title: `--set ${slider.key}=…; double-click for the value of the file` });
   const [factor, unit] = BIGGER[slider.unit] ?? [1, slider.unit], digits = Math.max(0, -Math.floor(Math.log10(slider.step * factor)));
-  const write = () => { shown.textContent = `${number(+input.value * factor, digits)} ${unit}`; box.classList.toggle("changed", slider.key in state.values); };
-  const moved = (dragging) => {
-    unhint();
-    const value = Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step));
+  const box = element("div", { class: "slider" }, element("span", {}, slider.label), element("span", {}, shown, ` ${unit}`), input);
+  const write = () => {
+    const changed = slider.key in state.values, value = (changed ? state.values[slider.key] : slider.value) * factor, exact = +value.toPrecision(6);
+    shown.value = changed && +exact.toFixed(digits) !== exact ? `${exact}`.replace("-", "−") : number(value, digits);
+    box.classList.toggle("changed", changed);
+  };
+  const take = (value, dragging) => {
     if (Math.abs(value - slider.value) < 1e-9) delete state.values[slider.key];
     else state.values[slider.key] = +value.toPrecision(9);
     write();
     asking.ask(dragging);
   };
+  const moved = (dragging) => {
+    unhint();
+    take(Math.min(slider.high, Math.max(slider.low, slider.low + Math.round((input.value - slider.low) / slider.step) * slider.step)), dragging);
+  };
+  // A typed value needs no step of the slider.
+  shown.addEventListener("change", () => {
+    const text = shown.value.replace("−", "-").replace(",", ".").replaceAll("\u202f", ""), value = text.trim() === "" ? NaN : text / factor, { low, high } = slider;
+    if (!Number.isFinite(value)) { write(); return; }
+    unhint();
+    input.value = Math.min(high, Math.max(low, value));
+    if (value < low || value > high) say(`${slider.label} ${text} is outside ${+(low * factor).toPrecision(6)} to ${`${+(high * factor).toPrecision(6)} ${unit}`.trim()}. The nearest value is driven.`, true);
+    take(+input.value, false);
+  });
   input.value = state.values[slider.key] ?? slider.value;
   // A finger that turns out to scroll has moved nothing.
   let before = null;

@@ -11,8 +11,10 @@ const PLOT_HEIGHT = 190, TRACK_HEIGHT = 290, PLOT_HEAD = 24, PLOT_GAP = 18;
 const LEAST_CONE = 2, CARS_APART = 110;
 // Least height of a track to one scale [px]; stretch beyond which no car is drawn along it.
 const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
-// Instants of the slider.
-const INSTANTS = 1000;
+// Plots of a picture from which on four stand in a row on a wide screen, unless they are over time.
+const MANY = 6;
+// Instants of the slider; most values at a plot if those of dotted lines are among them.
+const INSTANTS = 1000, MOST_TOLD = 6;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
 const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 170, PRINTED_MOST = 920;
 
@@ -49,7 +51,7 @@ function padded(low, high, least) {
   return [middle - half, middle + half];
 }
 
-const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(max-width: 760px)");
+const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(max-width: 760px), (max-height: 450px)"); // a telephone, upright or on its side
 // All that is drawn anew for another colour scheme, another width, or paper.
 const drawn = [];
 
@@ -102,7 +104,7 @@ class Chart {
     new ResizeObserver(() => this.fit()).observe(this.holder);
   }
 
-  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length ? 40 : 32)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : 230; }
+  get height() { return this.panel.names.length ? 60 + (this.panel.row_px ?? (this.panel.notes.length > this.panel.names.length ? 40 : NARROW.matches ? 35 : 30)) * this.panel.names.length : this.panel.equal ? Math.min(480, this.holder.clientWidth || 360) : NARROW.matches ? PLOT_HEIGHT : 230; }
 
   // Least and greatest value of all that is drawn, with some room, unless the panel gives them.
   ends(key) {
@@ -333,9 +335,13 @@ function drawPicture(box, picture, place) {
   }
   if (picture.scale) {
     const [label, low, high] = picture.scale;
-    bar.append(element("span", { class: "scale" }, label), element("span", { class: "scale" }, `${short(low)} `, element("span", { class: "shades" }), ` ${short(high)}`));
+    const shades = element("span", { class: "shades" });
+    // Lines and dots of the scale are lighter in the dark; areas are not.
+    if (picture.panels.some(({ curves }) => curves.some(({ shade }) => shade != null))) shades.style.background = `linear-gradient(90deg, ${VIRIDIS.map((_, i) => inkOf("", i / 4)).join(", ")})`;
+    bar.append(element("span", { class: "scale" }, label), element("span", { class: "scale" }, `${short(low)} `, shades, ` ${short(high)}`));
   }
   box.replaceChildren();
+  box.classList.toggle("many", picture.panels.length >= MANY && !picture.panels[0].x.startsWith("time"));
   const made = picture.panels.map((panel) => new Chart(box, panel, picture));
   charts.push(...made);
   if (bar.childNodes.length && !shared) box.before(bar);

@@ -72,7 +72,7 @@
       const title = [element("b", {}, panel.title), element("span", { class: "quiet" }, `${panel.unit}${panel.note ? ", " + panel.note : ""}`)];
       const [holder, values] = this.figure(title, "", `${panel.title} over time`);
       const lines = panel.series.map((series) => ({
-        stroke: () => this.colour(series.run), points: { show: false },
+        stroke: () => this.colour(series.run), points: { show: false }, gaps: wideGaps,
         width: series.dotted ? 1.2 : lineWidth(series.run), dash: series.dotted ? [1.5, 3] : dashed(runs[series.run], 1.5), cap: "butt",
       }));
       const plot = new uPlot({
@@ -97,10 +97,9 @@
       values.replaceChildren();
       if (i == null || u.cursor.left < 0) { if (this.track && !this.player.held) this.track.at(null); return; }
       values.append(`${this.time[i].toFixed(2)} s`);
-      panel.series.forEach((series, k) => {
-        // The value of the first curve of each run; desired values are not shown.
-        if (panel.series.findIndex((other) => other.run === series.run) !== k || !this.visible[series.run]) return;
-        values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})` }, shown(series.values[i])));
+      panel.series.forEach((series) => {
+        if (!this.visible[series.run] || (series.dotted && panel.series.length > MOST_TOLD)) return;
+        values.append(" ", element("span", { style: `--run: var(--run-${this.data.runs[series.run].place})${series.dotted ? "; border-bottom-style: dotted" : ""}` }, shown(series.values[i])));
       });
       // While it plays, the places of the cars come from the clock.
       if (!this.player.playing) this.show(i);
@@ -110,7 +109,7 @@
       const { ctx, bbox } = u;
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-      ctx.strokeStyle = ctx.fillStyle = paint.quiet;
+      ctx.strokeStyle = ctx.fillStyle = paint.quiet; ctx.lineWidth = devicePixelRatio;
       ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
       ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
       ctx.textBaseline = "top"; ctx.textAlign = "left";
@@ -163,7 +162,7 @@
       this.data = data;
       const note = this.note = element("span", { class: "quiet" });
       const title = [element("b", {}, "Track of the front axle centre"), note];
-      const finite = (key) => data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
+      const finite = (key) => data.whole?.[key] ?? data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
       this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
       // A course and a long track fill the width; a square track stands beside two plots.
       const span = ([low, high]) => high - low;

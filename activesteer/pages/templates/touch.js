@@ -1,3 +1,6 @@
+// A gap narrower than a pixel, where an angle jumps by a turn, would be drawn across.
+const wideGaps = (_plot, _series, _first, _last, gaps) => gaps.map(([from, to]) => [from - 2 * devicePixelRatio, to + 2 * devicePixelRatio]);
+
 // One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
 function touchable(u, zoom) {
   const over = u.over, fingers = new Map();

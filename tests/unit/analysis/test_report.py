@@ -24,7 +24,7 @@ from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
 from tests.raising import raises
-from tests.unit.analysis.synthetic import along_path, step_steer
+from tests.unit.analysis.synthetic import along_path, offset_track, step_steer
 from tests.unit.analysis.synthetic_files import lane_changes, recording_of, sines, step_steers
 from tests.unit.playback.synthetic import circle
 
@@ -128,7 +128,7 @@ LANES_KEPT = {"stays_in_lanes": 1.0, "lane_overstep_m": -0.1, "cones_hit": 0.0, 
 def test_what_went_wrong_stands_at_the_top_in_words():
     lost = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.324, "cones_hit": 1.0, "sideslip_peak_abs_rad": 0.8}
     found = told(through_cones(none=lost, ars=LANES_KEPT))
-    assert found["none"]["losses"] == ["lost: 46 deg of peak sideslip", "leaves the lane by 1.32 m", "hits 1 cone"]
+    assert found["none"]["losses"] == ["lost: sideslip angle of 46 deg", "leaves the lane by 1.32 m", "hits 1 cone"]
     assert found["ars"]["losses"] == []
     assert found["ars"]["kept"] == ["stays in the lanes", "hits no cone"]
 
@@ -195,7 +195,7 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     runs["runs/step-none.mcap"].metrics["sideslip_peak_rad"] = 1.0
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "2026-01-02" in top
-    assert "lost: 57 deg of peak sideslip" in top
+    assert "lost: sideslip angle of 57 deg" in top
     assert "Driven with none: speed 95 km/h (maneuver.speed_kmh) in place" in top  # not the other runs
     assert top.count("stays under control") == 2
     better = "\N{CHECK MARK} better"
@@ -294,6 +294,25 @@ def test_track_has_lanes_cones_and_path(page):
     assert (track["path"]["x"][-1] > 400.0, track["path"]["y"][-1]) == (True, 0)  # straight on
     assert track["tracks"][1]["run"] == 1
     assert track["view"]["x"] == [10.0, 205.0]
+
+
+def test_the_track_of_a_car_that_leaves_its_course_is_shown_as_a_whole():
+    away = recording_of(along_path(lambda x: 0.3 * x, path=offset_track), maneuver={"name": "lane_change"})
+    stays = recording_of(along_path(), maneuver={"name": "lane_change"})
+    alone = data_of(report_page({"a.mcap": away}))[0]["track"]
+    assert alone["view"] is None
+    assert alone["whole"]["y"][1] == pytest.approx(max(y for y in alone["tracks"][0]["y"] if y is not None), abs=0.1)
+    assert alone["whole"]["x"][1] >= 205.0  # the course too
+    both = data_of(report_page({"a.mcap": away, "b.mcap": stays}))[0]["track"]
+    assert both["view"]["y"][1] < 15.0  # the other car keeps its details
+
+
+def test_events_name_their_run_only_among_several():
+    run, other = recording_of(step_steer()), recording_of(step_steer())
+    run.metadata["events"] = [{"time_s": 1.0, "kind": "parameter", "what": "road.mu = 0.3"}]
+    assert "Events: road.mu = 0.3 at 1 s" in Page(report_page({"a.mcap": run})).words
+    page = report_page({"a.mcap": run, "b.mcap": other})
+    assert f"Events: {data_of(page)[0]['runs'][0]['label']}: road.mu" in Page(page).words
 
 
 def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
@@ -455,7 +474,7 @@ def test_lanes_cones_and_sideslip_are_said_with_their_sizes():
     assert outcome(good) == "stays in the lanes, hits no cone, largest sideslip angle 1.500 deg"
     bad = run(stays_in_lanes=0.0, lane_overstep_m=0.5, cones_hit=1.0, sideslip_peak_abs_rad=math.radians(50.0))
     assert outcome(bad) == (
-        "lost: 50 deg of peak sideslip, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
+        "lost: sideslip angle of 50 deg, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from activesteer.analysis import step_response
 from activesteer.analysis.metrics import KEY_FIGURES
-from activesteer.analysis.tables import Change, comparison, significance
+from activesteer.analysis.tables import Change, comparison, notes, significance
 from activesteer.core.metric_table import METRICS
 from tests.unit.analysis.synthetic import step_steer
 from tools.comparison import SHOWN
@@ -47,6 +47,7 @@ def test_a_car_that_has_turned_round_has_lost_metrics_but_its_verdicts_remain():
 
 def test_a_friction_utilisation_above_1_is_explained():
     assert "combined slip" in comparison({"none": {"friction_utilisation_max": 1.06}}).splitlines()[-1]
+    assert len(notes({"none": {"friction_utilisation_max": 1.06}})) == 1  # one sentence of a page
     assert len(comparison({"none": {"friction_utilisation_max": 0.9}}).splitlines()) == 2
 
 

@@ -61,7 +61,9 @@ export function finish(title = "Step steer, 80 km/h") {
   hear({ kind: "run", id, name: "none", title, figures: [], losses: [] }, [undefined]);
   hear({ kind: "finished", id, command: "", python: "" }, []);
 }
-export const slider = () => $("sliders").querySelectorAll("input")[0];
+const fields = (range) => $("sliders").querySelectorAll("input").filter((one) => (one.type === "range") === range);
+export const slider = () => fields(true)[0];
+export function type(text) { const [field] = fields(false); field.value = text; field.fire("change"); return field; }
 export function drag(value) { slider().value = value; slider().fire("input"); }
 export function tick(name, checked) {
   const box = $("controllers").querySelectorAll("input").find((one) => one.value === name);

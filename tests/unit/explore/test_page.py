@@ -36,7 +36,7 @@ def used(tmp_path: Path, events: str, address: str = "") -> Any:
     (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
     return script(
         tmp_path,
-        f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick }} from "./fake.mjs";
+        f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick, type }} from "./fake.mjs";
         location.hash = {json.dumps(address)};
         await import("./explore.mjs");
         start();
@@ -140,6 +140,19 @@ def test_gauges_show_at_most_all_grip_and_only_angles_that_the_controller_adds(t
     ]
 
 
+def test_the_last_lap_on_a_circle_stands_behind_the_stroke(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} globalThis.seen = [];
+        const see = (more) => {{ frame(more); seen.push(gauge("time")); }};
+        drive.rounds = drive.timed = true;
+        see({{ lap_s: 5.2, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});
+        drive.ghost = {{ lap_s: 20, frames: [{{ time_s: 0, poses: [0, 0, 0] }}] }};
+        see({{ lap_s: 0.4, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});""",
+    )
+    assert page["result"] == ["5.2 s", "0.4 / 18.7 s", "0.4 / 20.0 s", "0.4 / 18.7 s"]
+
+
 def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
     page = driven(
         tmp_path,
@@ -194,6 +207,13 @@ def test_a_controller_beyond_the_limit_is_unticked_and_named(
     assert result == [unticked, unticked]
 
 
+def test_a_jump_between_two_neighbouring_values_is_a_gap_that_can_be_seen(tmp_path: Path) -> None:
+    shared = (Path(str(resources.files("activesteer.pages"))) / "templates" / "touch.js").read_text("utf-8")
+    gaps = "wideGaps(null, 1, 0, 9, [[10, 10], [40, 60]])"
+    wide = script(tmp_path, f"globalThis.devicePixelRatio = 1;\n{shared}\nconsole.log(JSON.stringify({gaps}));")
+    assert wide == [[8, 12], [38, 62]]
+
+
 def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path) -> None:
     values = "[[0, 0], [-0.04, 1], [-0.06, 1], [2.5], [-123.45], [null], [7000000, 0], [1234.5, 1]]"
     texts = script(tmp_path, f"console.log(JSON.stringify({values}.map(([value, digits]) => number(value, digits))));")
@@ -204,6 +224,32 @@ def test_numbers_are_whole_where_they_count_and_zero_has_no_sign(tmp_path: Path)
 def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tmp_path: Path) -> None:
     page = used(tmp_path, "drag(90); drag(100); drag(110); finish(); slider().fire('change');")
     assert page["runs"] == [[90, True], [110, True], [110, False]]
+
+
+@pytest.mark.parametrize(("text", "value", "shown", "words"), [
+    ("83.7", 83.7, "83.7", ""),
+    ("83,7", 83.7, "83.7", ""),
+    ("900", 160, "160", "speed 900 is outside 20 to 160 km/h"),
+    ("abc", None, "80", ""),
+    ("", None, "80", ""),
+])  # fmt: skip
+def test_a_typed_value_is_driven_as_it_is(
+    text: str, value: float | None, shown: str, words: str, tmp_path: Path
+) -> None:
+    page = used(tmp_path, f"$('saved').textContent = type({json.dumps(text)}).value;")
+    assert page["runs"] == ([] if value is None else [[value, False]])
+    assert page["saved"] == shown
+    assert (words in page["message"]) if words else page["message"] == ""
+
+
+def test_sliders_of_the_choice_before_cannot_be_moved(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const shown = () => [$("sliders").inert, $("reset").disabled], steps = [shown()];
+        drag(90); steps.push(shown()); tick("lqr", true); steps.push(shown()); describe(); steps.push(shown());
+        $("saved").textContent = JSON.stringify(steps);""",
+    )
+    assert json.loads(page["saved"]) == [[False, True], [False, False], [True, True], [False, False]]
 
 
 def test_a_failed_run_does_not_stop_the_next_value(tmp_path: Path) -> None:
@@ -320,7 +366,7 @@ def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     page = used(
         tmp_path,
-        """const of = (lost, value) => [{ title: "Peak sideslip", unit: "deg", value, digits: null, lost }];
+        """const of = (lost, value) => [{ title: "Largest sideslip angle", unit: "deg", value, digits: null, lost }];
         const id = sent.at(-1)?.id ?? before.at(-1).id;
         hear({ kind: "run", id, name: "none", title: "", figures: of(true, null), losses: [] }, [undefined]);
         hear({ kind: "run", id, name: "ars", title: "", figures: of(true, null), losses: [] }, [undefined]);

@@ -126,7 +126,7 @@ def test_a_driver_is_offered_where_one_steers(tmp_path: Path) -> None:
 def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
     choice = RunRequest(maneuver="sine_with_dwell", controllers=("none", "ars"))
     lost, held, _ = (reply.header for reply in Runs(Folder(tmp_path)).run(choice, lambda: False))
-    assert lost["losses"] == ["lost: 45 deg of peak sideslip"]
+    assert lost["losses"] == ["lost: sideslip angle of 45 deg"]
     assert held["losses"] == []
 
 
@@ -144,8 +144,8 @@ def test_a_car_that_turns_round_has_its_sideslip_within_half_a_turn_and_no_figur
     assert drawn[-1] == pytest.approx(recorded_deg[-1], abs=0.5)  # the last one that is drawn
     assert 0 < np.isnan(drawn).sum() <= 3  # a gap, and not a line across the plot
     figures = {figure["title"]: figure for figure in run.header["figures"]}
-    assert figures["Peak sideslip"]["lost"]
-    assert figures["Peak sideslip"]["value"] is None
+    assert figures["Largest sideslip angle"]["lost"]
+    assert figures["Largest sideslip angle"]["value"] is None
 
 
 def test_runs_are_saved_once_until_they_change_or_their_file_is_gone(tmp_path: Path) -> None:
@@ -222,7 +222,7 @@ def test_a_count_has_no_decimals_and_groups_of_gains_are_named_in_words(tmp_path
     runs = Runs(Folder(tmp_path))
     figures = next(iter(runs.run(RunRequest(**choice), lambda: False))).header["figures"]
     assert {figure["title"]: figure["digits"] for figure in figures}["Cones hit"] == 0
-    assert {figure["title"]: figure["digits"] for figure in figures}["Peak sideslip"] is None
+    assert {figure["title"]: figure["digits"] for figure in figures}["Largest sideslip angle"] is None
     sliders = {slider["key"]: slider for slider in runs.describe(Describe(**choice)).header["sliders"]}
     groups = {slider["group"] for slider in sliders.values()}
     assert {"ARS", "desired yaw rate", "control unit and bus"} <= groups
