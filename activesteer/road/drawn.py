@@ -19,7 +19,7 @@ _MAX_ALONG: Final = 2000
 _WIDTH_M: Final = 8.0
 _ACROSS_M: Final = 0.5
 _EDGE_M: Final = 1e-3
-"""Distance of two places on both sides of an edge [m]."""
+"""Distance between two places on either side of an edge [m]."""
 
 
 class DrawnSurface(NamedTuple):
