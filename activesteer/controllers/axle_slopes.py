@@ -149,7 +149,7 @@ def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, f
 def axle_forces(
     block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float
 ) -> tuple[float, float, float, float]:
-    """Return the slip angles of both axles [rad], and their side forces per mass on the axle [m/s2].
+    """Return the slip angles of both axles [rad], and their side forces per unit of the mass on the axle [m/s2].
 
     Beyond the tabulated part a force keeps its last value, as a sliding tyre keeps most of its force.
     """
@@ -166,14 +166,14 @@ def axle_forces(
 
 @shared
 def front_slip(block: AxleSlopes, force_mps2: float, friction: float) -> float:
-    """Return the slip angle of the front axle for a side force per mass on it [rad]."""
+    """Return the slip angle of the front axle for a side force per unit of the mass that it carries [rad]."""
     slip = _between(table(block._front_slip_rad), abs(force_mps2) / friction / _AY_STEP_MPS2)
     return math.copysign(friction * slip, force_mps2)
 
 
 @shared
 def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
-    """Return the side force of an axle per mass on it at a slip angle [m/s2]."""
+    """Return the side force of an axle at a slip angle, per unit of the mass that it carries [m/s2]."""
     wanted, low, high = abs(slip_angle_rad) / friction, 0, len(slips) - 1
     if wanted >= slips[high]:
         return math.copysign(friction * _AY_STEP_MPS2 * high, slip_angle_rad)

@@ -73,7 +73,7 @@ class Corrector(NativeBlock):
     def step(self, error_radps: float, saturated: int = 0) -> float:
         """Return the angle of the corrector [rad].
 
-        With only a P part it has the sign of the error.
+        With only the proportional term it has the sign of the error.
 
         Args:
             error_radps: Desired less actual yaw rate [rad/s].

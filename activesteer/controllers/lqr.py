@@ -355,9 +355,9 @@ def fed_back(
 
 @shared
 def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
-    """Return the slip angle of soft front tyres less the slip angle of soft rear tyres, per acceleration [s2 rad/m].
+    """Return the understeer gradient that softer tyres add, at least 0 [s2 rad/m].
 
-    It is at least 0, and counts as far as the friction is not `certain`.
+    It fades to 0 as the friction becomes `certain`.
     """
     front = 1.0 + (1.0 - certain) * min(now[_FRONT_STIFFNESS] - 1.0, 0.0)
     rear = 1.0 + (1.0 - certain) * min(now[_REAR_STIFFNESS] - 1.0, 0.0)

@@ -180,7 +180,7 @@ class DesiredYawRateParameters:
 
 @dataclass(frozen=True)
 class CorrectorParameters:
-    """Parameters of tolerance band and PID corrector on the yaw rate error. The paper has only the P part."""
+    """Parameters of tolerance band and PID corrector on the yaw rate error. The paper has only the P term."""
 
     deadband_start_radps: _NotNegative = math.radians(0.5)
     """c_off: below this error there is no action [rad/s]."""
@@ -193,7 +193,7 @@ class CorrectorParameters:
     derivative_gain_s2: _NotNegative = 0.0
     """Steer angle per rate of change of the yaw rate error [rad/(rad/s2)]."""
     derivative_filter_s: _Lag = 0.02
-    """Time constant of the filter of the D part [s]."""
+    """Time constant of the filter of the derivative term [s]."""
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,10 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Actions (`Box`, float32, -1 to 1 or 0 to 1), in the order of `episodes.actions`, by the options. The command is the
     action times its scale:
 
-        driver="agent"       steering wheel 2 pi rad, drive torque 2500 Nm (-1 to 1); brake pedal 1 (0 to 1)
+        driver="agent"       steering wheel 2 pi rad, drive torque 2500 N m (-1 to 1); brake pedal 1 (0 to 1)
         actuators "rear"     rear wheels 0.0524 rad (3 deg), left positive (-1 to 1)
         actuators "front"    superposition 0.0524 rad at the road wheels, left positive (-1 to 1)
-        actuators "brakes"   brake torques of fl, fr, rl and rr 1500 Nm (0 to 1)
+        actuators "brakes"   brake torques of fl, fr, rl and rr 1500 N m (0 to 1)
 
     Observations (`Box`, float32), in the order of `episodes.observations`: speed_mps [m/s] +-100, yaw_rate_radps
     [rad/s] +-5, ay_mps2 and ax_mps2 [m/s2] +-30, steering_wheel_rad [rad] +-15, rear_steer_rad and superposition_rad

@@ -41,7 +41,7 @@ OPTIONAL: Final = ("speed_mps", "width_m")
 
 MIN_POINTS: Final = 4
 _MAX_GAP_M: Final = 20.0
-"""Largest distance of two points. A larger one counts as a jump [m]."""
+"""Largest distance between two points. A larger one counts as a jump [m]."""
 _MIN_GAP_M: Final = 1e-3
 _MAX_TURN_RAD: Final = math.radians(90.0)
 """Largest turn at a point. A larger one counts as going back [rad]."""

@@ -218,7 +218,7 @@ def fit(
     scheduler: str | None = None,
     progress: FitProgress = lambda *_: None,
 ) -> Fit:
-    """Find the values of factors that match a car best to recordings."""
+    """Find the values of factors that best match a car to recordings."""
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)

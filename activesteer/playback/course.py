@@ -90,7 +90,7 @@ def send_road(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
         quads = np.array([piece.corners_m for piece in pieces if piece.area == index])
         mu = [piece.mu for piece in pieces if piece.area == index]
         colour = _SLIPPERY if min(mu) < road.mu else _GRIPPY if max(mu) > road.mu else _ASPHALT
-        surface = _quadrangles(quads, 0.002 + 0.0005 * index, colour)
+        surface = _quadrilaterals(quads, 0.002 + 0.0005 * index, colour)
         stream.log(f"{ROAD}/patch_{index}_mu_{round(100 * areas[index].mu)}_percent", surface, static=True)
 
 
@@ -203,11 +203,11 @@ def _points(radius: float) -> Any:
 
 
 def _plane(low_x: float, high_x: float, low_y: float, high_y: float, z: float, colour: tuple[int, int, int]) -> Any:
-    return _quadrangles(np.array([[(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]]), z, colour)
+    return _quadrilaterals(np.array([[(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]]), z, colour)
 
 
-def _quadrangles(corners: Array, z: float, colour: tuple[int, int, int]) -> Any:
-    """Return quadrangles at a height as one mesh, from corners of shape (n, 4, 2)."""
+def _quadrilaterals(corners: Array, z: float, colour: tuple[int, int, int]) -> Any:
+    """Return quadrilaterals at a height as one mesh, from corners of shape (n, 4, 2)."""
     flat = corners.reshape(-1, 2)
     triangles = 4 * np.arange(len(corners))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return rr.Mesh3D(

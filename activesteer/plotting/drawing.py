@@ -26,7 +26,7 @@ DOTS_PER_INCH: Final = 300
 
 
 def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:
-    """Return an empty matplotlib figure of a size."""
+    """Return an empty matplotlib figure of the given size."""
     try:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow to import
     except ImportError as error:

@@ -190,7 +190,7 @@ class ProfileTable:
     right_z_m: tuple[float, ...] | None = None
     """Heights of the right track [m]. Default: the heights of the left track."""
     track_m: Annotated[float, Range(0.1, 10.0)] = 1.5
-    """Distance of the two tracks [m]."""
+    """Distance between the two tracks [m]."""
 
     def __post_init__(self) -> None:
         """Check the points of the height profile."""

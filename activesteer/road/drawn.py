@@ -19,7 +19,7 @@ _MAX_ALONG: Final = 2000
 _WIDTH_M: Final = 8.0
 _ACROSS_M: Final = 0.5
 _EDGE_M: Final = 1e-3
-"""Distance of two places on both sides of an edge [m]."""
+"""Distance between two places on either side of an edge [m]."""
 
 
 class DrawnSurface(NamedTuple):
@@ -35,13 +35,13 @@ class DrawnSurface(NamedTuple):
         return min(0.0, float(self.z_m.min())) - 0.02
 
     def to_table(self) -> dict[str, Any]:
-        """Return the surface as plain tables, heights rounded to 0.1 mm."""
+        """Return the surface as plain tables, with heights rounded to 0.1 mm."""
         return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
 
     def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
         """Return a mesh of the surface: corners in world axes [m], and triangles, anticlockwise from above.
 
-        Each quadrangle is divided along the diagonal that is nearer to level, so that a skew edge is no saw.
+        Each quadrilateral is divided along the diagonal that is nearer to level, so that a skew edge is not jagged.
         """
         s, d = np.meshgrid(self.s_m, self.d_m, indexing="ij")
         x, y = road.placed(s.ravel(), d.ravel())
@@ -60,7 +60,7 @@ class DrawnSurface(NamedTuple):
 def places_to_draw(road: Road, length_m: float) -> tuple[Array, Array]:
     """Return the positions along and across a road at which its surface is drawn [m]."""
     count = min(_MAX_ALONG, max(2, round(length_m / _STEP_M)))
-    # A skew edge passes a corner of each quadrangle where the steps have the ratio of its slope.
+    # A skew edge passes a corner of each quadrilateral where the steps have the ratio of its slope.
     skew = [abs(math.tan(obstacle.angle_rad)) for obstacle in road.obstacle if obstacle.angle_rad != 0.0]
     finest = 0.5 * _MAX_PLACES / count
     step = max(min([_ACROSS_M, *(_STEP_M / slope for slope in skew)]), 2.0 * _WIDTH_M / finest)

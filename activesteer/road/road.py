@@ -113,7 +113,7 @@ class Area(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A quadrangle for drawing, with the friction in its middle and corners anticlockwise [m]."""
+    """A quadrilateral for drawing, with the friction in its middle and corners anticlockwise [m]."""
 
     area: int
     mu: float
@@ -265,7 +265,7 @@ class Road:
         return (*split, *(Area(it.start_m, it.end_m, *SIDES[it.side], it.mu, _slope(it)) for it in self.patches))
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return quadrangles [m] of different friction within a rectangle of the world, later ones on top."""
+        """Return quadrilaterals [m] of different friction within a rectangle of the world, later ones on top."""
         shown = (area.clipped(start_m, end_m, right_m, left_m) for area in self.areas())
         return [
             piece
@@ -332,7 +332,7 @@ class LaidRoad(Road):
         return path.s_m[near] + dx * cos + dy * sin, dy * cos - dx * sin
 
     def pieces(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Piece]:
-        """Return all areas of different friction as quadrangles along the path, regardless of the rectangle."""
+        """Return all areas of different friction as quadrilaterals along the path. The rectangle is ignored."""
         path, found = self.path, []
         for index, area in enumerate(self.areas()):
             shown = area.clipped(0.0, path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
@@ -342,7 +342,7 @@ class LaidRoad(Road):
         return found
 
     def outlines(self, start_m: float, end_m: float, right_m: float, left_m: float) -> list[tuple[str, Array]]:
-        """Return label and corners of all steps and bumps along the path, regardless of the rectangle."""
+        """Return label and corners of all steps and bumps along the path. The rectangle is ignored."""
         return super().outlines(0.0, self.path.length_m, -_SHOWN_BESIDE_M, _SHOWN_BESIDE_M)
 
 

@@ -481,7 +481,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """Record a failure, and keep the recorded rows. The states of the blocks no longer match."""
+        """Context that records a failure and keeps the rows recorded before it."""
         try:
             yield
         except BaseException as failure:

@@ -40,7 +40,7 @@ _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
 def bench(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure one step at several stages."""
+    """Measure the time of a step at several stages, and the speed of whole runs."""
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
     sensed = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))

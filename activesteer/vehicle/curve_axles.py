@@ -355,7 +355,7 @@ _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 @inlined
 def _place(table, position):
-    """Return index, fraction and overshoot of a position on a spline, in intervals."""
+    """Return the interval of a position on a spline, the fraction of it, and the excess beyond an end in intervals."""
     at = (position - table.start_m) * table.per_m
     count = table.intervals
     inside = min(max(at, 0.0), count)

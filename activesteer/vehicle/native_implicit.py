@@ -71,7 +71,7 @@ def _stiffness(a, b, c, x):
 
 @inlined
 def _assemble(plan):
-    """Write the matrix M + h D + h^2 K and the right side f - h K v, in the order of elimination.
+    """Write the matrix M + h D + h^2 K and the right-hand side f - h K v, in the order of elimination.
 
     Negative damping and stiffness count as 0 in D and K, as in the engine; the forces hold them anyway.
     """

@@ -118,7 +118,7 @@ def mass_properties(
 
 
 def point_mass_inertia(offset_m: Array) -> Array:
-    """Return the inertia tensor of a point mass, per mass [m2] (Steiner)."""
+    """Return the inertia tensor of a point mass, per unit mass [m2] (Steiner)."""
     return np.asarray(offset_m @ offset_m * np.eye(3) - np.outer(offset_m, offset_m))
 
 

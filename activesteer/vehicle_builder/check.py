@@ -330,7 +330,7 @@ def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
 
 
 def _distance(one: _Rod, two: _Rod) -> float:
-    """Return the smallest distance of two segments [m]."""
+    """Return the smallest distance between two segments [m]."""
     along = np.stack([one.end_m - one.start_m, two.start_m - two.end_m], axis=1)
     return float(np.linalg.norm(lsq_linear(along, two.start_m - one.start_m, (0.0, 1.0), method="bvls").fun))
 

@@ -112,7 +112,7 @@ class Tuning:
         return [pair for pair in itertools.combinations(ever, 2) if not any(own.issuperset(pair) for own in held)]
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values, without the sets."""
+        """Return the result as JSON values, without the list of all sets."""
         names = {
             Goal.MINIMISE: ("without_effect",),
             Goal.SATISFY: ("never_together", "plausibility"),
