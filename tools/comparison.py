@@ -398,7 +398,7 @@ def comparison_figure(made: Comparison) -> Figure:
     legend = _legend(
         f"better than {first}",
         f"worse; full colour: a factor of {_RANGE:g}",
-        "not told apart, or neither better nor worse",
+        "no measurable difference, or neither better nor worse",
     )
     width_in, height_in = 4.2 + 0.85 * len(made.controllers), 1.2 + 0.26 * len(lines)
     return draw(Picture("", [heat], None, 1, width_in, height_in, legend))
