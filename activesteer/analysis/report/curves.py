@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
-from activesteer.analysis.report.groups import Group, ReportedRun
+from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun
 from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
@@ -66,9 +66,23 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
             for run in group.runs
         ],
         "panels": panels,
-        "marks": [{"time_s": at_s, "text": text} for at_s, text in marks(group.runs[0].recording)],
+        "marks": [{"time_s": at_s, "text": text} for at_s, text in _marks(group)],
         "track": _track(group, grid),
     }
+
+
+def _marks(group: Group) -> list[tuple[float, str]]:
+    """Return the times to mark in the plots, with their labels: marks of the manoeuvre, and changes during the runs."""
+    listed = [
+        [(event.time_s, event.what) for event in run.events if event.kind != "phase" and event.time_s > 0.0]
+        for run in group.runs
+    ]
+    changes = [
+        (at_s, what if all((at_s, what) in each for each in listed) else f"{run.name}: {what}")
+        for run, each in zip(group.runs, listed, strict=True)
+        for at_s, what in each[:MOST_EVENTS]
+    ]
+    return [*marks(group.runs[0].recording), *dict.fromkeys(changes)]
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:

@@ -315,6 +315,35 @@ def test_events_name_their_run_only_among_several():
     assert f"Events: {data_of(page)[0]['runs'][0]['label']}: road.mu" in Page(page).words
 
 
+def test_a_drive_by_hand_tells_its_lap_as_the_result_and_marks_its_changes():
+    run, other = recording_of(step_steer()), recording_of(step_steer())
+    for drive in (run, other):
+        drive.metadata["driver"] = {"name": "by hand"}
+    end_s = float(run.time_s[-1])
+    run.metadata |= {
+        "overrides": {"speed_kmh": 50.0},
+        "events": [
+            {"time_s": 0.0, "kind": "note", "what": "coarse"},
+            {"time_s": 1.0, "kind": "set", "what": "road.mu = 0.3"},
+            {"time_s": end_s, "kind": "note", "what": "last lap 18.57 s"},
+        ],
+    }
+    page = report_page({"a.mcap": run})
+    assert data_of(page)[0]["marks"] == [{"time_s": 1.0, "text": "road.mu = 0.3"}]
+    words = Page(page).words
+    assert "Result " in words
+    assert "last lap 18.57 s" in words
+    assert "last lap 18.57 s at" not in words
+    assert "in place of the manoeuvre's own" not in words
+    # Among several runs, a mark says whose change it is, unless all have it.
+    names = [each["name"] for each in data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["runs"]]
+    (mark,) = data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["marks"]
+    assert mark["text"] == f"{names[0]}: road.mu = 0.3"
+    other.metadata["events"] = run.metadata["events"]
+    (mark,) = data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["marks"]
+    assert mark["text"] == "road.mu = 0.3"
+
+
 def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
     cones = ((30.0, 1.6), (45.0, 0.5))
     page = report_page({"a.mcap": recording_of(along_path(cones=cones), maneuver={"name": "cones"})})
