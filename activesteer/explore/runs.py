@@ -442,6 +442,6 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             known = size if math.isfinite(size) and not is_lost else None
             figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
             if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
-                figure |= {"title": "Room to the edge of the lane", "value": None if known is None else -known}
+                figure["value"] = None if known is None else -known
             found.append(figure)
     return found

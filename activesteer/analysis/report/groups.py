@@ -19,7 +19,7 @@ from activesteer.analysis.claims.scorecard import (
 )
 from activesteer.analysis.harm import failures, kept
 from activesteer.analysis.source import entry
-from activesteer.core.conventions import RunLook, run_looks
+from activesteer.core.conventions import SYSTEM_LABELS, RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.recording import Recording
@@ -128,7 +128,10 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
 
 def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
-    runs = tuple(ReportedRun(*named[run], run, look) for run, look in run_looks(named).items())
+    looks = run_looks(named)
+    if len(looks) == 1 and (label := SYSTEM_LABELS.get(run := next(iter(looks)))):
+        looks[run] = looks[run]._replace(label=label[2:])  # its number would read as the number of a run
+    runs = tuple(ReportedRun(*named[run], run, look) for run, look in looks.items())
     title = entry(runs[0].recording, "maneuver", "title") or name
     return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)
 

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from datetime import date
+from operator import neg
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -22,7 +23,7 @@ from activesteer.analysis.tables import Cell, Change, difference_text, is_near, 
 from activesteer.config import leaves
 from activesteer.core.conventions import RunLook
 from activesteer.core.files import write_text
-from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
 from activesteer.core.units import display_unit, parameter_label, parameter_title, typeset
 from activesteer.errors import ParameterError
 from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
@@ -353,7 +354,7 @@ def key_figures(group: Group) -> dict[str, str]:
 
 def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> dict[str, Any]:
     """Return a key figure with its difference from the first run and the significance of the difference."""
-    sizes = abs if recorded_metric(name).better is Better.SMALLER else float
+    sizes = neg if name == LANE_OVERSTEP else abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = shown(name, metrics, number(name, value))
     before = math.nan if first is None else sizes(first.get(name, math.nan))
@@ -362,7 +363,7 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     difference = difference_text(name, value, before)
     if is_near(name, value, before):
         return {"text": text, "difference": difference.text, "change": Change.SAME}
-    change = significance(name, value, before)
+    change = significance(name, metrics[name], (first or {})[name])
     return {"text": text, "difference": difference.percent or difference.text, "change": change}
 
 

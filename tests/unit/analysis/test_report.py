@@ -16,7 +16,7 @@ import pytest
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge, outcome
-from activesteer.analysis.report.run_page import parameters, results
+from activesteer.analysis.report.run_page import key_figures, parameters, results
 from activesteer.analysis.tables import Change, difference_text, number
 from activesteer.core.metric_table import recorded_metric
 from activesteer.core.signals import Channel
@@ -158,6 +158,24 @@ def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first
     found = told(through_cones(none={metric: first}, ars={metric: other}))
     assert [figure["change"] for figure in found["ars"]["figures"]] == [change]
     assert found["none"]["figures"][0]["difference"] == ""
+
+
+def test_titles_of_key_figures_say_what_differs_from_the_metric():
+    metrics = {"lane_overstep_m": -0.2, "yaw_rate_after_1750ms_share": -0.4, "heading_end_rad": -0.5}
+    groups = through_cones(none=metrics)
+    assert list(key_figures(groups)) == [
+        "Room to the edge of the lane [m]", "Yaw rate remaining after 1.75 s, magnitude [%]",
+        "Final heading, magnitude [deg]",
+    ]  # fmt: skip
+    assert [figure["text"] for figure in told(groups)["none"]["figures"]] == ["0.200", "40.00", "28.65"]
+
+
+def test_a_single_run_has_no_number():
+    assert data_of(report_page({"a.mcap": recording_of(step_steer(), "ars")}))[0]["runs"][0]["label"] == (
+        "active rear steering"
+    )
+    two = {name: recording_of(step_steer(), name) for name in ("none", "ars")}
+    assert data_of(report_page(two))[0]["runs"][1]["label"] == "2 active rear steering"
 
 
 def test_no_change_is_good_or_bad_next_to_a_run_that_is_lost():
