@@ -67,6 +67,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
         ],
         "panels": panels,
         "marks": [{"time_s": at_s, "text": text} for at_s, text in _marks(group)],
+        "slip_limit_deg": _slip_limit_deg(group),
         "track": _track(group, grid),
     }
 
@@ -83,6 +84,14 @@ def _marks(group: Group) -> list[tuple[float, str]]:
         for at_s, what in each[:MOST_EVENTS]
     ]
     return [*marks(group.runs[0].recording), *dict.fromkeys(changes)]
+
+
+def _slip_limit_deg(group: Group) -> float | None:
+    """Return the slip angle of the largest side force of the rear tyres [deg], if it is one throughout all runs."""
+    limits = {run.recording.metadata.get("slip_limit_rad") for run in group.runs}
+    if len(limits) > 1 or None in limits or any(event.kind == "set" for run in group.runs for event in run.events):
+        return None
+    return round(math.degrees(limits.pop()), 1)
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:

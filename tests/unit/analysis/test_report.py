@@ -394,6 +394,22 @@ def test_instants_of_the_standard_are_marked(page):
     assert step["marks"] == cones["marks"] == []
 
 
+def test_slip_angle_of_the_largest_side_force_is_one_throughout_the_runs():
+    runs = {f"{name}.mcap": recording_of(step_steer(), name) for name in ("none", "ars")}
+    none, ars = runs.values()
+
+    def limit_deg() -> float | None:
+        return plots(groups_of(runs)[0])["slip_limit_deg"]
+
+    assert limit_deg() is None
+    none.metadata["slip_limit_rad"] = math.radians(7.5)
+    assert limit_deg() is None  # the other run has none
+    ars.metadata["slip_limit_rad"] = math.radians(7.5)
+    assert limit_deg() == 7.5
+    ars.metadata["events"] = [{"time_s": 1.0, "kind": "set", "what": "road.mu = 0.3"}]
+    assert limit_deg() is None
+
+
 def test_phases_of_a_manoeuvre_are_marked():
     run = recording_of(step_steer())
     run.metadata["events"] = [
