@@ -101,10 +101,7 @@ _SPEED_MPS: Final = 20.0
 
 
 def slip_limit_deg(scenario: Scenario) -> float | None:
-    """Return the slip angle of the largest side force of a rear tyre at static load [deg].
-
-    It is None for a flat curve, and for a road without a single friction.
-    """
+    """Return the slip angle of the largest side force of a rear tyre [deg], None for a flat curve or two frictions."""
     road = scenario.maneuver.road
     if is_overruled(road, "mu"):
         return None

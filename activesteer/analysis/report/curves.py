@@ -74,14 +74,11 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 def _marks(group: Group) -> list[tuple[float, str]]:
     """Return the times to mark in the plots, with their labels: marks of the manoeuvre, and changes during the runs."""
-    listed = [
-        [(event.time_s, event.what) for event in run.events if event.kind != "phase" and event.time_s > 0.0]
-        for run in group.runs
-    ]
     changes = [
-        (at_s, what if all((at_s, what) in each for each in listed) else f"{run.name}: {what}")
-        for run, each in zip(group.runs, listed, strict=True)
-        for at_s, what in each[:MOST_EVENTS]
+        (it.time_s, it.what if all(it in other.events for other in group.runs) else f"{run.name}: {it.what}")
+        for run in group.runs
+        for it in run.events[:MOST_EVENTS]
+        if it.kind != "phase" and it.time_s > 0.0
     ]
     return [*marks(group.runs[0].recording), *dict.fromkeys(changes)]
 

@@ -89,8 +89,8 @@ class ReportedRun(NamedTuple):
     def result(self) -> str:
         """Result of a drive, such as the time of its last lap, which its last event holds; empty for none."""
         last = events_of(self.recording.metadata)[-1:] if self.by_hand else []
-        at_end = [event.what for event in last if event.kind == "note" and event.time_s >= self.recording.time_s[-1]]
-        return "".join(at_end)
+        end_s = self.recording.time_s[-1]
+        return "".join(event.what for event in last if event.kind == "note" and event.time_s >= end_s)
 
 
 class Group(NamedTuple):
