@@ -101,7 +101,7 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
     sections = [
         metrics,
         *(Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")],
-                  kind="repeated" if picture.panels[0].names else "") for picture in pictures),
+                  kind="repeated" if picture.title == "target bands" else "") for picture in pictures),
     ]  # fmt: skip
     title = f"Kinematics and compliance: {result.vehicle}"
     return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
