@@ -203,8 +203,9 @@ KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
     kind: tuple(_TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"])) for kind in EVALUATIONS
 }
 """Kind of manoeuvre -> metrics that are printed first and held against the baseline, the most telling first."""
+_TITLES: Final[dict[str, str]] = _TABLE["key_figures"]["titles"]
 KEY_FIGURES: Final = {
-    metric(names[0]).label[0].upper() + metric(names[0]).label[1:]: tuple(names)
+    _TITLES.get(names[0], metric(names[0]).label[0].upper() + metric(names[0]).label[1:]): tuple(names)
     for names in _TABLE["key_figures"]["metrics"]
 }
 """Title of a key figure -> names of metrics, of which the first one that a run has is shown and named."""

@@ -37,9 +37,9 @@ from activesteer.road.course import Footprint
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
 from activesteer.scenario import Scenario, resolve, value_of
+from activesteer.scenario.run_context import slip_limit_deg
 from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
-from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle import Vehicle
 
 _MANEUVER: Final = {
@@ -258,7 +258,7 @@ class Runs:
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
-            run["slip_limit_deg"] = None if mu is None else slip_limit_deg(scenario, mu)
+            run["slip_limit_deg"] = slip_limit_deg(scenario)
             run |= {"title": (scenario.maneuver.title or choice.maneuver) + held, "note": note}
             try:
                 controller = controller_spec(self.folder.located(name))
@@ -407,26 +407,6 @@ def _plain(name: str) -> str:
     return "".join(letter if letter.isalnum() else "_" for letter in name)[:100]
 
 
-_LARGEST_SLIP_DEG: Final = 20.0
-"""Largest slip angle that is looked at [deg]: beyond 15 to 20 deg, no tyre file has measured values."""
-_CLEAR_DROP: Final = 0.01
-"""Share by which the side force must fall behind its largest value. A flat curve has no slip angle to warn of."""
-_SPEED_MPS: Final = 20.0
-"""Speed of the wheel [m/s]; the side force hardly depends on it."""
-
-
-def slip_limit_deg(scenario: Scenario, mu: float) -> float | None:
-    """Return the slip angle of the largest side force of a rear tyre at static load [deg], or None for a flat curve."""
-    tyre, load_N = scenario.car.tyres[1], scenario.car.config.single_track.wheel_loads_N[1]
-    angles_deg = np.arange(0.5, _LARGEST_SLIP_DEG, 0.1)
-    friction = mu / tyre.conventions.reference_friction
-    forces = MagicFormula(tyre).evaluate(load_N, 0.0, np.radians(angles_deg), vx_mps=_SPEED_MPS, road_friction=friction)
-    force_N = np.abs(forces.fy_N)
-    largest = int(np.argmax(force_N))
-    clear = force_N[-1] < (1.0 - _CLEAR_DROP) * force_N[largest]
-    return round(float(angles_deg[largest]), 1) if clear else None
-
-
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
     found = []
@@ -442,6 +422,6 @@ def _figures(recording: Recording) -> list[dict[str, Any]]:
             known = size if math.isfinite(size) and not is_lost else None
             figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
             if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
-                figure |= {"title": "Room to the edge of the lane", "value": None if known is None else -known}
+                figure["value"] = None if known is None else -known
             found.append(figure)
     return found

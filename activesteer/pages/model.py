@@ -190,7 +190,7 @@ class Section(NamedTuple):
         points: Items of a list.
         pictures: Pictures, whose panels the page draws.
         level: Level of its heading: 2, or 3 for a part of the section before.
-        kind: Class of the list in the stylesheet.
+        kind: Class of the list in the stylesheet, or "repeated" for pictures of a table's values, folded on a phone.
         anchor: Name by which links and the page's own script find the section, which ends with what the script draws.
     """
 

@@ -129,6 +129,7 @@ SCHEMA: Final[Mapping[str, Check]] = {
     "controller_uses_truth": _flag,
     "controller_interval_s": _number(1e-9, 1e3),
     "timestep_s": _number(1e-9, 1e3),
+    "slip_limit_rad": _number(0.0, 2.0),
     "overrides": table_of,
     "versions": _all(_name),
     "maneuver": table_of,

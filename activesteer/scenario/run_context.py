@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from activesteer.config import is_overruled
 from activesteer.controllers.find import interval_s
 from activesteer.core.conventions import Array
 from activesteer.core.signals import Channel
@@ -20,6 +22,7 @@ from activesteer.recording import McapWriter, Poses, Recording, ScenePart
 from activesteer.road.drawn import DrawnSurface, places_to_draw
 from activesteer.road.surface import surface_of
 from activesteer.scenario.scenario import Scenario, describe
+from activesteer.tyre.evaluation import MagicFormula
 from activesteer.vehicle import Vehicle
 
 _BEYOND_M: Final = 30.0
@@ -50,6 +53,7 @@ class RunContext(NamedTuple):
             **({"controller_uses_truth": True} if controller.uses_truth else {}),
             **({"controller_interval_s": own_s} if own_s != vehicle.timestep_s else {}),
             "car": vehicle.dimensions(),
+            **({} if (slip_deg := slip_limit_deg(scenario)) is None else {"slip_limit_rad": math.radians(slip_deg)}),
             "timestep_s": vehicle.timestep_s,
             "versions": _versions(),
         }
@@ -86,3 +90,26 @@ def _versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[package] = "unknown"
     return found
+
+
+_LARGEST_SLIP_DEG: Final = 20.0
+"""Largest slip angle that is looked at [deg]: beyond 15 to 20 deg, no tyre file has measured values."""
+_CLEAR_DROP: Final = 0.01
+"""Share by which the side force must fall behind its largest value. A flat curve has no slip angle to warn of."""
+_SPEED_MPS: Final = 20.0
+"""Speed of the wheel [m/s]; the side force hardly depends on it."""
+
+
+def slip_limit_deg(scenario: Scenario) -> float | None:
+    """Return the slip angle of the largest side force of a rear tyre [deg], None for a flat curve or two frictions."""
+    road = scenario.maneuver.road
+    if is_overruled(road, "mu"):
+        return None
+    tyre, load_N = scenario.car.tyres[1], scenario.car.config.single_track.wheel_loads_N[1]
+    angles_deg = np.arange(0.5, _LARGEST_SLIP_DEG, 0.1)
+    friction = road.mu / tyre.conventions.reference_friction
+    forces = MagicFormula(tyre).evaluate(load_N, 0.0, np.radians(angles_deg), vx_mps=_SPEED_MPS, road_friction=friction)
+    force_N = np.abs(forces.fy_N)
+    largest = int(np.argmax(force_N))
+    clear = force_N[-1] < (1.0 - _CLEAR_DROP) * force_N[largest]
+    return round(float(angles_deg[largest]), 1) if clear else None

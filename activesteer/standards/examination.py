@@ -136,9 +136,10 @@ def examination_page(result: Examination) -> Page:
         sections.append(Section("All controllers", pictures=list(together.values())))
     for name, found in result.findings.items():
         mark = ":" if found.error or found.passed is None else ""  # none after a chip
-        words = Markup("{}{} {}.").format(_verdict(found), mark, found.error or typeset(found.summary))
+        first, *others = (found.error or typeset(found.summary)).split(". ")
+        words = [Markup("{}{} {}.").format(_verdict(found), mark, first), *(f"{other}." for other in others)]
         own = [picture for picture in found.pictures if picture.title not in together]
-        sections.append(Section(name, [words], found.tables, pictures=own))
+        sections.append(Section(name, words, found.tables, pictures=own))
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),

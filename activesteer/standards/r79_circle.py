@@ -22,7 +22,7 @@ from activesteer.core.conventions import Array
 from activesteer.core.signals import DriverCommand, Measurement, Motion, Setpoint
 from activesteer.core.units import display_unit, three_digits
 from activesteer.errors import SimulationDiverged
-from activesteer.pages import Table
+from activesteer.pages import Table, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, check_parts, resolve
 from activesteer.simulation.closed_loop import ClosedLoop
@@ -156,21 +156,22 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
     if done:
         worst = max(done, key=lambda row: row["steering_correction_rad"])
         words = (
-            f"{_named(worst)} ({worst['direction']}) needs the largest correction, "
+            f"{_named(worst).replace(': ', ' ')} in the {worst['direction']} circle needs the largest correction, "
             f"{math.degrees(worst['steering_correction_rad']):.0f} deg at the steering wheel; the car is "
             f"{abs(worst['lateral_offset_1s_driver_m']):.2f} m off its course after 1 s"
         )
     count = len({row["fault"] for row in faults})
     if idle := count - len(_with_effect(faults)):
-        words += f"; {idle} of {count} faults change nothing with this controller"
-    return words + ("" if done == faults else f"; {len(faults) - len(done)} of {len(faults)} faults did not finish")
+        words += f". {idle} of {count} faults change nothing with this controller"
+    return words + ("" if done == faults else f". {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
 
 def _effort_table(efforts: list[dict[str, Any]]) -> Table:
     rows = [
         (
             row["steering"].replace("_", " "), row["direction"], f"{row['radius_m']:g}", cell(row["time_s"], 2),
-            cell(row["effort_N"], 1), f"{row['limit_N']:.0f}", "pass" if row["pass"] else "fail",
+            cell(row["effort_N"], 1), f"{row['limit_N']:.0f}",
+            passed("pass", chip=True) if row["pass"] else failed("fail", chip=True),
         )
         for row in efforts
     ]  # fmt: skip

@@ -139,7 +139,7 @@ def shown(browser: Browser) -> Iterator[Callable[..., Shown]]:
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("request", lambda request: wrong.extend({request.url} - {path.as_uri()}))
         page.goto(path.as_uri())
-        page.wait_for_selector("canvas, main svg")
+        page.wait_for_selector("canvas, main svg", state="attached")
         return page
 
     yield shown

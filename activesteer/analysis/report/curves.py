@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
-from activesteer.analysis.report.groups import Group, ReportedRun
+from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun
 from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
@@ -66,9 +66,29 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
             for run in group.runs
         ],
         "panels": panels,
-        "marks": [{"time_s": at_s, "text": text} for at_s, text in marks(group.runs[0].recording)],
+        "marks": [{"time_s": at_s, "text": text} for at_s, text in _marks(group)],
+        "slip_limit_deg": _slip_limit_deg(group),
         "track": _track(group, grid),
     }
+
+
+def _marks(group: Group) -> list[tuple[float, str]]:
+    """Return the times to mark in the plots, with their labels: marks of the manoeuvre, and changes during the runs."""
+    changes = [
+        (it.time_s, it.what if all(it in other.events for other in group.runs) else f"{run.name}: {it.what}")
+        for run in group.runs
+        for it in run.events[:MOST_EVENTS]
+        if it.kind != "phase" and it.time_s > 0.0
+    ]
+    return [*marks(group.runs[0].recording), *dict.fromkeys(changes)]
+
+
+def _slip_limit_deg(group: Group) -> float | None:
+    """Return the slip angle of the largest side force of the rear tyres [deg], if it is one throughout all runs."""
+    limits: set[Any] = {run.recording.metadata.get("slip_limit_rad") for run in group.runs}
+    if len(limits) > 1 or None in limits or any(event.kind == "set" for run in group.runs for event in run.events):
+        return None
+    return round(math.degrees(limits.pop()), 1)
 
 
 def time_grid(times_s: Sequence[Array]) -> Array:

@@ -19,10 +19,11 @@ from activesteer.analysis.claims.scorecard import (
 )
 from activesteer.analysis.harm import failures, kept
 from activesteer.analysis.source import entry
-from activesteer.core.conventions import RunLook, run_looks
+from activesteer.core.conventions import SYSTEM_LABELS, RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.recording import Recording
+from activesteer.recording.contents import Event, events_of
 from activesteer.recording.recording import run_names
 
 
@@ -55,6 +56,9 @@ def _same(recordings: list[Recording], table: str) -> bool:
 MAX_RUNS: Final = 60
 """Most runs of a report. With more runs, nobody can read the page and a browser is slow to open it."""
 
+MOST_EVENTS: Final = 20
+"""Most events of a run that a report names."""
+
 
 class ReportedRun(NamedTuple):
     """A recording in a report."""
@@ -69,6 +73,24 @@ class ReportedRun(NamedTuple):
         """Reason why the run is incomplete, empty for a complete run."""
         metadata = self.recording.metadata
         return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
+
+    @property
+    def by_hand(self) -> bool:
+        """True if a person drove."""
+        return entry(self.recording, "driver", "name") == "by hand"
+
+    @property
+    def events(self) -> list[Event]:
+        """Events during the run, without the result of a drive."""
+        listed = events_of(self.recording.metadata)
+        return listed[:-1] if self.result else listed
+
+    @property
+    def result(self) -> str:
+        """Result of a drive, such as the time of its last lap, which its last event holds; empty for none."""
+        last = events_of(self.recording.metadata)[-1:] if self.by_hand else []
+        end_s = self.recording.time_s[-1]
+        return "".join(event.what for event in last if event.kind == "note" and event.time_s >= end_s)
 
 
 class Group(NamedTuple):
@@ -106,7 +128,10 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
 
 def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
-    runs = tuple(ReportedRun(*named[run], run, look) for run, look in run_looks(named).items())
+    looks = run_looks(named)
+    if len(looks) == 1 and (label := SYSTEM_LABELS.get(run := next(iter(looks)))):
+        looks[run] = looks[run]._replace(label=label[2:])  # its number would read as the number of a run
+    runs = tuple(ReportedRun(*named[run], run, look) for run, look in looks.items())
     title = entry(runs[0].recording, "maneuver", "title") or name
     return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)
 

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from datetime import date
+from operator import neg
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -16,18 +17,17 @@ from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, nu
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
 from activesteer.analysis.metrics import KEY_FIGURES
 from activesteer.analysis.report.curves import plots
-from activesteer.analysis.report.groups import Group, ReportedRun, groups_of, judge
+from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.config import leaves
 from activesteer.core.conventions import RunLook
 from activesteer.core.files import write_text
-from activesteer.core.metric_table import Better, recorded_metric
+from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
 from activesteer.core.units import display_unit, parameter_label, parameter_title, typeset
 from activesteer.errors import ParameterError
 from activesteer.pages import Page, Section, Table, Text, failed, passed, render_page
 from activesteer.recording import Recording
-from activesteer.recording.contents import events_of
 
 TITLE: Final = "activesteer report"
 _VERDICT_LOOK: Final = {
@@ -44,7 +44,6 @@ _CHANGE_MARK: Final = {
     Change.OTHER: "",
 }
 """Marks in addition to the colours, for readers who cannot see the colours."""
-_MOST_EVENTS: Final = 20
 
 
 def write_report(recordings: Mapping[str, Recording], path: str | os.PathLike[str]) -> Path:
@@ -129,9 +128,10 @@ def _swatch(look: RunLook) -> Markup:
 
 
 def _outcome(found: Mapping[str, Any]) -> Markup:
-    """Return the failures of a run and the requirements that it met."""
+    """Return the result of a drive, the failures of a run and the requirements that it met."""
     looks = ((failed, found["losses"]), (passed, found["kept"]))
-    return Markup(" ").join(look(", ".join(words), chip=True) for look, words in looks if words)
+    chips = [look(", ".join(words), chip=True) for look, words in looks if words]
+    return Markup(" ").join(filter(None, [found["run"].result, *chips]))
 
 
 def _told(figure: Mapping[str, Any]) -> Text:
@@ -149,11 +149,12 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     names = [run.name for run in group.runs]
     told_first: list[Text] = []
     if changed := _changed(group):
-        words = Markup("Driven with <b>{}</b> in place of the manoeuvre's own.")
+        own = "" if group.runs[0].by_hand else " in place of the manoeuvre's own"
+        words = Markup("Driven with <b>{}</b>" + own + ".")
         told_first.append(words.format("; ".join(changed)))
     if events := _events(group):
         told_first.append(Markup("Events: <b>{}</b>.").format("; ".join(events)))
-    judged = any(each["losses"] or each["kept"] for each in found)
+    judged = any(map(_outcome, found))
     rows = [
         [_swatch(each["run"].look) + each["run"].look.label, *([_outcome(each)] if judged else []),
          *map(_told, each["figures"])]
@@ -253,10 +254,10 @@ def _vehicle(groups: Sequence[Group], names: Sequence[str]) -> Section:
 def _events(group: Group) -> list[str]:
     """Return the events during the runs, one line for each run."""
     several = len(group.runs) > 1
-    listed = {f"{run.look.label}: " * several: events_of(run.recording.metadata) for run in group.runs}
+    listed = {f"{run.look.label}: " * several: run.events for run in group.runs}
     return [
-        f"{label}{', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:_MOST_EVENTS])}"
-        + (f" and {len(events) - _MOST_EVENTS} more" if len(events) > _MOST_EVENTS else "")
+        f"{label}{', '.join(f'{event.what} at {event.time_s:.4g} s' for event in events[:MOST_EVENTS])}"
+        + (f" and {len(events) - MOST_EVENTS} more" if len(events) > MOST_EVENTS else "")
         for label, events in listed.items()
         if events
     ]
@@ -353,7 +354,7 @@ def key_figures(group: Group) -> dict[str, str]:
 
 def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] | None) -> dict[str, Any]:
     """Return a key figure with its difference from the first run and the significance of the difference."""
-    sizes = abs if recorded_metric(name).better is Better.SMALLER else float
+    sizes = neg if name == LANE_OVERSTEP else abs if recorded_metric(name).better is Better.SMALLER else float
     value = sizes(metrics.get(name, math.nan))
     text = shown(name, metrics, number(name, value))
     before = math.nan if first is None else sizes(first.get(name, math.nan))
@@ -362,7 +363,7 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     difference = difference_text(name, value, before)
     if is_near(name, value, before):
         return {"text": text, "difference": difference.text, "change": Change.SAME}
-    change = significance(name, value, before)
+    change = significance(name, metrics[name], (first or {})[name])
     return {"text": text, "difference": difference.percent or difference.text, "change": change}
 
 
@@ -376,7 +377,8 @@ def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
         span_s = float(run.recording.time_s[-1] - run.recording.time_s[0])
         controller = str(run.recording.metadata.get("controller", ""))
         vehicle = entry(run.recording, "vehicle", "name")
-        rows.append([run.source, group.name, controller, vehicle, f"{span_s:.3f} s", overrides][: len(titles)])
+        name = group.title if run.by_hand else group.name
+        rows.append([run.source, name, controller, vehicle, f"{span_s:.3f} s", overrides][: len(titles)])
     return titles, rows
 
 

@@ -344,6 +344,9 @@ function drawPicture(box, picture, place) {
   box.classList.toggle("many", picture.panels.length >= MANY && !picture.panels[0].x.startsWith("time"));
   const made = picture.panels.map((panel) => new Chart(box, panel, picture));
   charts.push(...made);
+  // Pictures below each other with one abscissa name it once, below the last.
+  const next = box.nextElementSibling?.matches(".plots") && DATA.pictures?.[place + 1];
+  if (next && next.panels.length === made.length && made.every(({ panel }, i) => panel.x === next.panels[i].x && !panel.above)) for (const below of box.querySelectorAll(".abscissa")) below.hidden = true;
   if (bar.childNodes.length && !shared) box.before(bar);
   return made;
 }

@@ -1,6 +1,8 @@
 // The plots of the report. Each group of runs has linked plots over one time axis, and a track that marks the same
 // instant. Data: `groups` of the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
 (() => {
+  const SLIP = "Slip angle of the axles";
+
   class Group {
     constructor(data) {
       this.data = data;
@@ -70,7 +72,8 @@
     panel(panel) {
       const { runs } = this.data;
       const title = [element("b", {}, panel.title), element("span", { class: "quiet" }, `${panel.unit}${panel.note ? ", " + panel.note : ""}`)];
-      const [holder, values] = this.figure(title, "", `${panel.title} over time`);
+      const [holder, values] = this.figure(title, "", `${panel.title} over time`), shaded = panel.title === SLIP && this.data.slip_limit_deg != null;
+      if (shaded) holder.after(element("p", { class: "key quiet" }, this.slipTold(panel)));
       const lines = panel.series.map((series) => ({
         stroke: () => this.colour(series.run), points: { show: false }, gaps: wideGaps,
         width: series.dotted ? 1.2 : lineWidth(series.run), dash: series.dotted ? [1.5, 3] : dashed(runs[series.run], 1.5), cap: "butt",
@@ -82,7 +85,7 @@
         axes: [axis(26, " s"), axis(46)],
         series: [{}, ...lines],
         hooks: {
-          draw: [(u) => this.marks(u)],
+          drawAxes: shaded ? [(u) => this.shade(u)] : [], draw: [(u) => this.marks(u)],
           setScale: [(u, key) => { if (key === "x" && u === this.plots[0]) this.limit(u.scales.x); }],
           setCursor: [(u) => this.read(u, panel, values)],
         },
@@ -103,6 +106,26 @@
       });
       // While it plays, the places of the cars come from the clock.
       if (!this.player.playing) this.show(i);
+    }
+
+    // When the rear axle of each run is first beyond the slip angle of the largest side force.
+    slipTold(panel) {
+      const limit = this.data.slip_limit_deg, several = this.data.runs.length > 1;
+      const beyond = panel.series.filter(({ dotted }) => !dotted).flatMap(({ run, values }) => {
+        const at = values.findIndex((value) => value != null && Math.abs(value) > limit);
+        return at < 0 ? [] : [`${several ? `${this.data.runs[run].name} ` : ""}from ${this.time[at].toFixed(2)} s`];
+      });
+      return `Shaded, beyond ${limit.toFixed(1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${beyond.join(", ") || (several ? "no run" : "never")}.`;
+    }
+
+    shade(u) {
+      const { ctx, bbox } = u, y = (value) => Math.min(Math.max(u.valToPos(value, "y", true), bbox.top), bbox.top + bbox.height);
+      const limit = this.data.slip_limit_deg;
+      ctx.save();
+      ctx.fillStyle = paint.failed; ctx.globalAlpha = 0.12;
+      ctx.fillRect(bbox.left, bbox.top, bbox.width, y(limit) - bbox.top);
+      ctx.fillRect(bbox.left, y(-limit), bbox.width, bbox.top + bbox.height - y(-limit));
+      ctx.restore();
     }
 
     marks(u) {

@@ -100,8 +100,8 @@ def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> 
     metrics = Section("Metrics", tables=tables)
     sections = [
         metrics,
-        *(Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")])
-          for picture in pictures),
+        *(Section(picture.title[0].upper() + picture.title[1:], pictures=[picture._replace(title="")],
+                  kind="repeated" if picture.title == "target bands" else "") for picture in pictures),
     ]  # fmt: skip
     title = f"Kinematics and compliance: {result.vehicle}"
     return write_page(Page(f"activesteer kc: {result.vehicle}", title, lead, sections), folder / "kc.html")
@@ -300,7 +300,7 @@ def _ideal_outer_deg(axle: Axle, inner_deg: Array) -> Array:
 
 def _targets(result: KcResult) -> Picture:
     """Position of each metric within its target band."""
-    rows = [entry for entry in result.metrics if entry.band is not None]
+    rows = sorted(result.targeted, key=lambda entry: entry.inside is True)  # those outside first
     places = [min(max(_place(entry), -_FURTHEST), 1.0 + _FURTHEST) for entry in rows]
     curves = [
         Curve(

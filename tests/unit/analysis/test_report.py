@@ -16,7 +16,7 @@ import pytest
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge, outcome
-from activesteer.analysis.report.run_page import parameters, results
+from activesteer.analysis.report.run_page import key_figures, parameters, results
 from activesteer.analysis.tables import Change, difference_text, number
 from activesteer.core.metric_table import recorded_metric
 from activesteer.core.signals import Channel
@@ -158,6 +158,24 @@ def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first
     found = told(through_cones(none={metric: first}, ars={metric: other}))
     assert [figure["change"] for figure in found["ars"]["figures"]] == [change]
     assert found["none"]["figures"][0]["difference"] == ""
+
+
+def test_titles_of_key_figures_say_what_differs_from_the_metric():
+    metrics = {"lane_overstep_m": -0.2, "yaw_rate_after_1750ms_share": -0.4, "heading_end_rad": -0.5}
+    groups = through_cones(none=metrics)
+    assert list(key_figures(groups)) == [
+        "Room to the edge of the lane [m]", "Yaw rate remaining after 1.75 s, magnitude [%]",
+        "Final heading, magnitude [deg]",
+    ]  # fmt: skip
+    assert [figure["text"] for figure in told(groups)["none"]["figures"]] == ["0.200", "40.00", "28.65"]
+
+
+def test_a_single_run_has_no_number():
+    assert data_of(report_page({"a.mcap": recording_of(step_steer(), "ars")}))[0]["runs"][0]["label"] == (
+        "active rear steering"
+    )
+    two = {name: recording_of(step_steer(), name) for name in ("none", "ars")}
+    assert data_of(report_page(two))[0]["runs"][1]["label"] == "2 active rear steering"
 
 
 def test_no_change_is_good_or_bad_next_to_a_run_that_is_lost():
@@ -315,6 +333,35 @@ def test_events_name_their_run_only_among_several():
     assert f"Events: {data_of(page)[0]['runs'][0]['label']}: road.mu" in Page(page).words
 
 
+def test_a_drive_by_hand_tells_its_lap_as_the_result_and_marks_its_changes():
+    run, other = recording_of(step_steer()), recording_of(step_steer())
+    for drive in (run, other):
+        drive.metadata["driver"] = {"name": "by hand"}
+    end_s = float(run.time_s[-1])
+    run.metadata |= {
+        "overrides": {"speed_kmh": 50.0},
+        "events": [
+            {"time_s": 0.0, "kind": "note", "what": "coarse"},
+            {"time_s": 1.0, "kind": "set", "what": "road.mu = 0.3"},
+            {"time_s": end_s, "kind": "note", "what": "last lap 18.57 s"},
+        ],
+    }
+    page = report_page({"a.mcap": run})
+    assert data_of(page)[0]["marks"] == [{"time_s": 1.0, "text": "road.mu = 0.3"}]
+    words = Page(page).words
+    assert "Result " in words
+    assert "last lap 18.57 s" in words
+    assert "last lap 18.57 s at" not in words
+    assert "in place of the manoeuvre's own" not in words
+    # Among several runs, a mark says whose change it is, unless all have it.
+    names = [each["name"] for each in data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["runs"]]
+    (mark,) = data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["marks"]
+    assert mark["text"] == f"{names[0]}: road.mu = 0.3"
+    other.metadata["events"] = run.metadata["events"]
+    (mark,) = data_of(report_page({"a.mcap": run, "b.mcap": other}))[0]["marks"]
+    assert mark["text"] == "road.mu = 0.3"
+
+
 def test_track_shows_which_cones_are_hit_and_the_cars_in_their_size():
     cones = ((30.0, 1.6), (45.0, 0.5))
     page = report_page({"a.mcap": recording_of(along_path(cones=cones), maneuver={"name": "cones"})})
@@ -345,6 +392,22 @@ def test_instants_of_the_standard_are_marked(page):
     step, sine, cones = data_of(page)
     assert [mark["text"] for mark in sine["marks"]] == ["end of steer", "+1.00 s", "+1.75 s"]
     assert step["marks"] == cones["marks"] == []
+
+
+def test_slip_angle_of_the_largest_side_force_is_one_throughout_the_runs():
+    runs = {f"{name}.mcap": recording_of(step_steer(), name) for name in ("none", "ars")}
+    none, ars = runs.values()
+
+    def limit_deg() -> float | None:
+        return plots(groups_of(runs)[0])["slip_limit_deg"]
+
+    assert limit_deg() is None
+    none.metadata["slip_limit_rad"] = math.radians(7.5)
+    assert limit_deg() is None  # the other run has none
+    ars.metadata["slip_limit_rad"] = math.radians(7.5)
+    assert limit_deg() == 7.5
+    ars.metadata["events"] = [{"time_s": 1.0, "kind": "set", "what": "road.mu = 0.3"}]
+    assert limit_deg() is None
 
 
 def test_phases_of_a_manoeuvre_are_marked():

@@ -13,10 +13,8 @@ import activesteer
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
-from activesteer.explore.runs import Reply, Runs, slip_limit_deg
+from activesteer.explore.runs import Reply, Runs
 from activesteer.resources import find_maneuver, list_maneuvers
-from activesteer.scenario import resolve
-from activesteer.tyre.evaluation import MagicFormula
 
 OWN = (Path(__file__).parents[3] / "examples" / "own_controller.py").read_text("utf-8")
 SEARCHING = ("brake_in_turn", "fishhook", "sine_with_dwell", "step_steer", "split_mu_braking")
@@ -167,18 +165,6 @@ def test_room_to_the_edge_of_the_lane_is_positive_inside(tmp_path: Path) -> None
     runs.save()
     (path,) = tmp_path.glob("*.mcap")
     assert room["value"] == pytest.approx(-activesteer.Recording.open(path).metrics["lane_overstep_m"])
-
-
-def test_less_friction_gives_a_smaller_slip_angle_of_the_largest_side_force() -> None:
-    scenario = resolve("step_steer")
-    dry, snow = slip_limit_deg(scenario, 0.9), slip_limit_deg(scenario, 0.3)
-    assert dry is not None
-    assert dry == pytest.approx(7.5, abs=0.5)
-    assert snow == pytest.approx(2.5, abs=0.5)
-    rear, load_N = MagicFormula(scenario.car.tyres[1]), scenario.car.config.single_track.wheel_loads_N[1]
-    before, at, after = (abs(rear.evaluate(load_N, 0.0, math.radians(dry + more)).fy_N) for more in (-3.0, 0.0, 3.0))
-    assert max(before, after) < at
-    assert slip_limit_deg(resolve("step_steer", "bmw_m8"), 0.9) is None  # its curve is flat
 
 
 def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:

@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from activesteer.core.files import json_text
 from activesteer.errors import ParameterError
+from activesteer.plotting import Panel
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
+from activesteer.rigs.kc.figures import _targets
 from activesteer.rigs.kc.held_car import WheelPose
 from activesteer.rigs.kc.metrics import DEFINITIONS, FORMULAS, load_targets
 from activesteer.rigs.kc.programme import steering_axis
@@ -114,6 +116,18 @@ def test_a_car_without_bands_gets_no_chart_and_no_count_of_bands(tmp_path: Path)
     for text in (result.table(), page):
         assert "target band" not in text
         assert "of 0" not in text
+
+
+def test_the_chart_shows_the_metrics_outside_their_bands_first() -> None:
+    first, *_ = [entry for entry in compact().metrics if entry.inside]
+    low, high = first.band or (0.0, 0.0)
+    outside = replace(first, value=high + (high - low), inside=False)
+    last = [entry for entry in compact().metrics if entry is not first]
+    (panel,) = _targets(replace(compact(), metrics=(*last, outside))).panels
+    assert isinstance(panel, Panel)
+    count = len(compact().outside) + 1
+    assert [curve.marker for curve in panel.curves[: count + 1]] == ["D"] * count + ["o"]
+    assert outside.name.removeprefix(f"{outside.axle}_").replace("_", " ") in panel.names[count - 1]
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ def test_every_plot_of_the_faults_names_its_rows_and_no_dot_covers_another():
         "yaw rate sensor: offset 2 deg/s",
         "without effect: rear: stuck",
     ]
-    assert "; 1 of 3 faults change nothing" in r79_circle._fault_words(faults)
+    assert ". 1 of 3 faults change nothing" in r79_circle._fault_words(faults)
     assert "change nothing" not in r79_circle._fault_words(faults[:2])
     for panel in r79_circle._dots(faults).panels:
         assert isinstance(panel, Panel)
