@@ -168,11 +168,18 @@ export class Drive {
     this.again = true;
   }
 
-  failed() {
+  failed(why = "choose another control or car") {
     this.again = false;
     this.fold();
     $("waiting").hidden = false;
-    $("start").textContent = "Cannot drive: choose another control or car";
+    $("start").textContent = `Cannot drive: ${why}`;
+  }
+
+  // The connection has ended, and with it a drive.
+  lost() {
+    this.running = this.ready = false;
+    $("end").hidden = $("again").hidden = $("start").disabled = true;
+    this.failed("no connection");
   }
 
   begin(header, arrays) {

@@ -26,7 +26,7 @@ const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
 window.activesteer = state; // for tests and the curious
 
-const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); $("start").disabled = true; });
+const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); drive.lost(); });
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
@@ -68,7 +68,7 @@ function readAddress() {
   if (wanted.drive != null) {
     const told = drive.choose(wanted);
     show("drive");
-    say(told, true);
+    if (told) say(told, true);
   } else if (drive.shown) show("explore");
 }
 

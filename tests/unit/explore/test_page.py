@@ -19,7 +19,7 @@ def script(tmp_path: Path, text: str) -> Any:
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: apt-get install nodejs")
-    for name in ("asking", "number"):
+    for name in ("asking", "number", "socket"):
         (tmp_path / f"{name}.mjs").write_text((PAGE / f"{name}.js").read_text("utf-8"))
     imports = 'import { Asking, untickBeyond } from "./asking.mjs";\nimport { number } from "./number.mjs";\n'
     (tmp_path / "test.mjs").write_text(f"{imports}{text}")
@@ -36,7 +36,7 @@ def used(tmp_path: Path, events: str, address: str = "") -> Any:
     (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
     return script(
         tmp_path,
-        f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick, type }} from "./fake.mjs";
+        f"""import {{ $, describe, disconnect, drag, finish, hear, sent, slider, start, tick, type }} from "./fake.mjs";
         location.hash = {json.dumps(address)};
         await import("./explore.mjs");
         start();
@@ -361,6 +361,28 @@ def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
         assert used(tmp_path, fifth + action)["message"] == ""
     error = "hear({ kind: 'error', text: 'no such file', about: null }, []);"
     assert used(tmp_path, error + "$('save').fire('click');")["message"] == "no such file"  # an error stays
+
+
+@pytest.mark.parametrize("action", [
+    "$('vehicle').fire('change');", "tick('lqr', true);", "drag(90);", "$('reset').fire('click');",
+    "location.hash = '#drive=slalom'; $('window').fire('hashchange');",
+])  # fmt: skip
+def test_after_the_connection_is_lost_every_choice_says_so(action: str, tmp_path: Path) -> None:
+    page = used(tmp_path, f"disconnect('opened in another window'); $('close').fire('click'); {action}")
+    assert page["sent"] == []
+    assert page["message"] == "opened in another window"
+    assert page["state"] == ""
+
+
+def test_without_a_connection_no_car_is_prepared(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} frame(); drive.socket.send = () => drive.lost(); drive.lost();
+        const seen = [$("start").textContent, $("start").disabled, $("end").hidden, drive.running];
+        $("course").fire("change"); globalThis.seen = [...seen, $("start").textContent];""",
+    )
+    told = "Cannot drive: no connection"
+    assert page["result"] == [told, True, True, False, told]
 
 
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
