@@ -252,6 +252,22 @@ def test_sliders_of_the_choice_before_cannot_be_moved(tmp_path: Path) -> None:
     assert json.loads(page["saved"]) == [[False, True], [False, False], [True, True], [False, False]]
 
 
+def test_runs_of_two_values_are_never_shown_together(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const steps = [], shown = () => [...window.activesteer.runs.values()];
+        const seen = () => steps.push([$("title").textContent, ...shown().map(({ title }) => title)]);
+        const run = (name, title) => {
+          hear({ kind: "run", id: sent.at(-1).id, name, title, figures: [], losses: [] }, [undefined]); seen(); };
+        const finished = () => { hear({ kind: "finished", id: sent.at(-1).id, command: "", python: "" }, []); seen(); };
+        tick("lqr", true); describe(); run("none", "80"); run("lqr", "80"); finished();
+        drag(83); run("none", "83"); run("lqr", "83"); finished();
+        $("saved").textContent = JSON.stringify(steps);""",
+    )
+    one, both, next_value = ["80", "80"], ["80", "80", "80"], ["83", "83", "83"]
+    assert json.loads(page["saved"]) == [one, both, both, both, both, next_value]
+
+
 def test_a_failed_run_does_not_stop_the_next_value(tmp_path: Path) -> None:
     page = used(
         tmp_path, "drag(90); drag(100); hear({ kind: 'error', text: 'no', about: 'run', id: sent.at(-1).id }, []);"
