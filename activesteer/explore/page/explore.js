@@ -253,13 +253,14 @@ function strokeOf(run) {
 const swatchOf = (run) => element("i", { class: "swatch", style: `background:${strokeOf(run)}` });
 const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
 
-// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own.
+// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own, which also
+// says which car fails, since the table is far below.
 function showColours() {
   for (const [name, swatch] of swatches) {
     const run = state.runs.get(name);
     swatch.setAttribute("style", run ? `background:${strokeOf(run)}` : "visibility:hidden"); // its place stays
   }
-  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
+  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run), run.losses?.length ? element("b", {}, " fails") : "")));
 }
 
 // On a phone the heading is out of sight while a slider moves.

@@ -414,6 +414,19 @@ def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     assert json.loads(page["saved"]) == ["lost", "lost", "3.00"]
 
 
+def test_a_car_that_fails_is_named_next_to_the_sliders(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const run = (name, losses) =>
+          hear({ kind: "run", id: before.at(-1).id, name, title: "", figures: [], losses }, [undefined]);
+        run("none", ["lost"]); run("ars", []);
+        hear({ kind: "run", id: before.at(-1).id, name: "afs", title: "", error: "no such file" }, []);
+        const bold = (one) => one.querySelectorAll("b").map(({ words }) => words);
+        $("saved").textContent = JSON.stringify($("legend").children.map((one) => [one.words, ...bold(one)]));""",
+    )
+    assert json.loads(page["saved"]) == [["none", " fails"], ["ars"], ["afs"]]
+
+
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
     reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"
