@@ -144,13 +144,33 @@ def test_the_last_lap_on_a_circle_stands_behind_the_stroke(tmp_path: Path) -> No
     page = driven(
         tmp_path,
         f"""{GO} globalThis.seen = [];
-        const see = (more) => {{ frame(more); seen.push(gauge("time")); }};
+        const labels = [], label = (box) => box.children[0].textContent.startsWith("time");
+        const see = (more) => {{
+          frame(more); seen.push(gauge("time"));
+          labels.push($("gauges").children.find(label).children[0].textContent); }};
         drive.rounds = drive.timed = true;
         see({{ lap_s: 5.2, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});
         drive.ghost = {{ lap_s: 20, frames: [{{ time_s: 0, poses: [0, 0, 0] }}] }};
-        see({{ lap_s: 0.4, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});""",
+        see({{ lap_s: 0.4, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});
+        seen.push(...labels);""",
     )
-    assert page["result"] == ["5.2 s", "0.4 / 18.7 s", "0.4 / 20.0 s", "0.4 / 18.7 s"]
+    assert page["result"][:4] == ["5.2 s", "0.4 / 18.7 s", "0.4 / 20.0 s", "0.4 / 18.7 s"]
+    assert page["result"][4:] == ["time", "time / last lap", "time / ghost", "time / last lap"]
+
+
+def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""const saved = (file) => drive.ended({{ time_s: 3, behind_s: 0, file, folder: "/f", error: "" }});
+        const told = () => $("driven").children[0];
+        {GO} drive.way = "Last lap"; frame({{ lap_s: 1, last_lap_s: 18.57 }});
+        key("r"); saved("first.mcap"); ready(); drive.going();
+        frame({{ last_lap_s: null }}); key("r"); saved("second.mcap"); ready(); drive.going();
+        frame({{ last_lap_s: null }}); $("end").fire("click"); saved("third.mcap");
+        globalThis.seen = [told()]; {GO} frame({{ last_lap_s: null }}); saved("fourth.mcap"); seen.push(told());""",
+    )
+    assert page["result"][0].startswith("Before the restart: last lap 18.57 s, saved as first.mcap. 3.0 s driven")
+    assert page["result"][1].startswith("3.0 s driven")
 
 
 def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
