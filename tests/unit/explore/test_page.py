@@ -447,6 +447,34 @@ def test_a_car_that_fails_is_named_next_to_the_sliders(tmp_path: Path) -> None:
     assert json.loads(page["saved"]) == [["none", " fails"], ["ars"], ["afs"]]
 
 
+def test_a_front_axle_that_slides_without_the_rear_one_is_told(tmp_path: Path) -> None:
+    curves = (PAGE / "curves.js").read_text("utf-8").replace("./look.js", "./fake.mjs")
+    (tmp_path / "curves.mjs").write_text(curves)
+    (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
+    told = script(
+        tmp_path,
+        """import { Curves } from "./curves.mjs";
+        import { element } from "./fake.mjs";
+        const title = "Slip angle of the axles", figure = element("figure");
+        figure.appendChild = (child) => child;
+        const run = (front, rear) => ({ plots: { start_s: 0, step_s: 0.5, panels: [{ title, series: [
+          { dotted: false, values: rear }, { dotted: true, values: front }] }] } });
+        const of = (...runs) => {
+          const one = { plots: new Map([[title, { figure }]]), runs: new Map(runs), limit: () => 7.5 };
+          Curves.prototype.tellSlip.call(one);
+          return one.plots.get(title).told.textContent;
+        };
+        const spins = ["none", run([0, -9, -9], [0, 2, 8])], pushes = ["afs", run([0, 2, -9], [null, 1, 1])];
+        const grips = ["ars", run([0, 2, 2], [0, 1, 1])];
+        console.log(JSON.stringify([of(spins, pushes, grips), of(pushes), of(grips, ["lqr", { error: "no" }])]));""",
+    )
+    assert [text.partition("Rear axle ")[2] for text in told] == [
+        "beyond it: none from 1.00 s. Only front axle beyond it: afs from 1.00 s.",
+        "beyond it: no run. Only front axle beyond it: afs from 1.00 s.",
+        "beyond it: no run.",
+    ]
+
+
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:
     reply = "{ kind: 'saved', files: ['a.mcap'], folder: '/f' }"
     assert used(tmp_path, f"$('save').fire('click'); hear({reply}, []);")["saved"] == "saved a.mcap in /f"
