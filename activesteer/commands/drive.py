@@ -311,15 +311,14 @@ def _explore(options: argparse.Namespace) -> None:
     port = options.port or 0
     if not 0 <= port <= 65535:
         raise ParameterError(f"--port: is {port}, must be 0 to 65535")
-    if not Path(options.output).is_dir():
-        raise ParameterError(f"-o: {options.output} is not a folder; the page reads and writes files there")
+    folder = make_folder(options.output, ParameterError)
     try:
         from activesteer.explore.server import ExploreServer
     except ModuleNotFoundError as error:
         raise ParameterError(
             f"explore needs {error.name}, which is not installed: pip install 'activesteer[explore]'"
         ) from error
-    server = ExploreServer(Path(options.output), port)
+    server = ExploreServer(folder, port)
     options.saved = server.saved  # other programs may write into the same folder
 
     def listening() -> None:

@@ -340,7 +340,7 @@ class Runs:
             if key not in self._held_rad and (angle_rad := searched_angle(self._resolved(choice, {}))) is not None:
                 self._held_rad[key] = angle_rad
         fixed, words = _fixed_amplitude(with_amplitude_found(scenario, angle_rad=self._held_rad[key]), overrides)
-        note = f"The search for the amplitude fails with these values, so the {words}."
+        note = f"The search for the amplitude fails with these values, so {words}."
         return with_amplitude_found(self._resolved(choice, fixed)), fixed, "", note
 
     def _driven(self, scenario: Scenario, controller: Plugin, stale: Callable[[], bool]) -> Recording | None:
@@ -388,7 +388,10 @@ def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tupl
             angle_deg = float(f"{math.degrees(angle_rad):g}")  # as the command repeats it
             useless = {f"{table}.{key}" for key in getattr(owner, "OVERRULED", {})}
             kept = {key: value for key, value in overrides.items() if key not in useless}
-            words = f"{name.replace('_', ' ').removesuffix(' angle')} angle stays at {angle_deg:.0f} deg"
+            words = f"the {name.replace('_', ' ').removesuffix(' angle')} angle stays at {angle_deg:.0f} deg"
+            if factor := getattr(owner, "amplitude_factor", None):
+                words = f"A, the steering wheel angle at 0.3 g, stays at {angle_deg / factor:.1f} deg"
+                words += f" as the last search found it. The amplitude is {angle_deg:.0f} deg"
             return {**kept, f"{table}.{name}_deg".lstrip("."): angle_deg}, words
     raise ManeuverError(f"{maneuver.name}: the amplitude of this manoeuvre has no key")
 

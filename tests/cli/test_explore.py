@@ -190,13 +190,20 @@ def test_a_dead_worker_is_replaced(url: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "missing"], "not a folder")]
+    ("options", "said"), [(["--port", "70000"], "0 to 65535"), (["-o", "file"], "cannot make the folder file")]
 )
 def test_wrong_options_are_refused_in_one_line(
-    call: Call, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
 ) -> None:
+    (tmp_path / "file").touch()
     monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: pytest.fail("the page is served"))
     done = call("explore", "--no-browser", *options)
     assert done.status == 1
     assert said in done.err
     assert len(done.err.splitlines()) == 1
+
+
+def test_a_missing_folder_is_made(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **__: None)
+    assert call("explore", "--no-browser", "-o", "new/folder").status == 0
+    assert (tmp_path / "new" / "folder").is_dir()

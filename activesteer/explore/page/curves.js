@@ -76,17 +76,20 @@ export class Curves {
     this.marking = false;
   }
 
-  // Say when the rear axle of each run is beyond the slip angle of the largest side force, which is shaded.
+  // Say when the rear axle of each run, or only its front axle, is beyond the slip angle of the largest side force,
+  // which is shaded.
   tellSlip() {
     const shown = this.plots.get(SLIP), limit = this.limit();
     if (!shown) return;
-    const beyond = [...this.runs].filter(([, run]) => run.plots).flatMap(([name, run]) => {
-      const rear = run.plots.panels.find(({ title }) => title === SLIP)?.series.find(({ dotted }) => !dotted)?.values ?? [];
-      const at = firstBeyond(rear, limit);
-      return at < 0 ? [] : [`${name} from ${number(run.plots.start_s + at * run.plots.step_s, 2)} s`];
-    });
+    const rear = [], front = [];
+    for (const [name, run] of this.runs) {
+      const series = run.plots?.panels.find(({ title }) => title === SLIP)?.series ?? [];
+      const of = (is) => firstBeyond(series.find(({ dotted }) => dotted === is)?.values ?? [], limit);
+      const at = of(false) < 0 ? of(true) : of(false);
+      if (at >= 0) (of(false) < 0 ? front : rear).push(`${name} from ${number(run.plots.start_s + at * run.plots.step_s, 2)} s`);
+    }
     shown.told ??= shown.figure.appendChild(element("p", { class: "quiet told" }));
-    shown.told.textContent = limit == null ? "" : `Shaded, beyond ${number(limit, 1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${beyond.join(", ") || "no run"}.`;
+    shown.told.textContent = limit == null ? "" : `Shaded, beyond ${number(limit, 1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${rear.join(", ") || "no run"}.${front.length ? ` Only front axle beyond it: ${front.join(", ")}.` : ""}`;
   }
 
   limit() { return [...this.runs.values()].find((run) => run.plots)?.slip_limit_deg ?? null; }

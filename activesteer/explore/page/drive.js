@@ -40,7 +40,7 @@ export class Drive {
     this.shown = this.running = this.held = this.again = false;
     this.number = this.asked = 0;
     this.sent = new Map();
-    this.last = "";
+    this.last = this.earlier = ""; // earlier: the last time before a restart
     this.ghosts = new Map(); // setting -> {frames, lap_s} of the last drive, preferably of a complete one
     this.touch = { steer: 0, throttle: 0, brake: 0 };
     $("course").replaceChildren(...Object.entries(courses).map(([name, { title }]) => option(name, title)));
@@ -168,11 +168,18 @@ export class Drive {
     this.again = true;
   }
 
-  failed() {
+  failed(why = "choose another control or car") {
     this.again = false;
     this.fold();
     $("waiting").hidden = false;
-    $("start").textContent = "Cannot drive: choose another control or car";
+    $("start").textContent = `Cannot drive: ${why}`;
+  }
+
+  // The connection has ended, and with it a drive.
+  lost() {
+    this.running = this.ready = false;
+    $("end").hidden = $("again").hidden = $("start").disabled = true;
+    this.failed("no connection");
   }
 
   begin(header, arrays) {
@@ -324,7 +331,9 @@ export class Drive {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: ["speed", "time"].includes(name) ? "large" : PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
     }
     Object.values(rows).forEach((text, i) => { $("gauges").children[i].lastElementChild.textContent = text; });
+    const stroke = !before || header.missed ? "" : this.rounds && header.last_lap_s ? " / last lap" : " / ghost";
     const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
+    gauge("time").firstElementChild.textContent = `time${stroke}`;
     gauge("cones").hidden = !cones;
     gauge("rear steer").hidden = !this.rear || (cones && small.matches); // a phone has no room for both
     gauge("front steer added").hidden = !this.front;
@@ -361,9 +370,12 @@ export class Drive {
     const timed = lap ? `${this.way}: ${number(lap, 2)} s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: the last gate was not passed${cones}. ` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
+    const earlier = this.earlier;
+    if (!this.again) this.earlier = "";
+    else if (lap) this.earlier = `Before the restart: ${this.way.toLowerCase()} ${number(lap, 2)} s, saved as ${header.file}. `;
     if (this.shown && this.ready) this.prepare();
     // A small screen has no room for what few want to know.
-    $("driven").replaceChildren(`${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
+    $("driven").replaceChildren(`${earlier}${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);

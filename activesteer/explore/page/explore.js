@@ -26,7 +26,7 @@ const scene = new Scene($("view"));
 const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: [], wanted: {}, asked: 0, curves };
 window.activesteer = state; // for tests and the curious
 
-const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); $("start").disabled = true; });
+const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); drive.lost(); });
 const drive = new Drive(socket, say);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
@@ -68,7 +68,7 @@ function readAddress() {
   if (wanted.drive != null) {
     const told = drive.choose(wanted);
     show("drive");
-    say(told, true);
+    if (told) say(told, true);
   } else if (drive.shown) show("explore");
 }
 
@@ -109,6 +109,7 @@ const asking = new Asking((dragging) => {
   state.asked = performance.now();
   $("saved").textContent = ""; // other runs
   state.first = null;
+  state.coming = []; // runs of this value, until they are shown
   writeAddress();
   $("state").textContent = "driving …";
   usable(false);
@@ -164,18 +165,16 @@ const hear = {
 
   run(header, arrays) {
     if (header.id !== state.id) return;
-    showTitle(header.title);
-    $("note").textContent = header.note ?? "";
-    // The runs of the value before stay until they are replaced, so that nothing flickers while a slider is dragged.
     if (state.first == null) state.first = performance.now() - state.asked;
     if (header.error) { state.failed = state.id; say(`${header.name}: ${header.error}`); }
-    if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
-    state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
-    redraw();
+    state.coming.push([header, arrays]);
+    // The runs of the value before stay until all of the new value are there: what is compared has the same value.
+    if ([...state.runs.values()].every((run) => run.id === state.id)) showComing();
   },
 
   finished(header) {
     if (header.id !== state.id) return;
+    showComing();
     state.released = !state.dragged;
     state.all = performance.now() - state.asked;
     if (state.failed != null && state.failed !== state.id) { state.failed = null; say(""); } // its cause is gone
@@ -207,6 +206,17 @@ const hear = {
   going: () => drive.going(),
   driven: (header) => drive.ended(header),
 };
+
+function showComing() {
+  if (!state.coming.length) return;
+  for (const [header, arrays] of state.coming.splice(0)) {
+    showTitle(header.title);
+    $("note").textContent = header.note ?? "";
+    if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
+    state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
+  }
+  redraw();
+}
 
 function redraw() {
   curves.show(state.runs, state.ghosts);
@@ -243,13 +253,14 @@ function strokeOf(run) {
 const swatchOf = (run) => element("i", { class: "swatch", style: `background:${strokeOf(run)}` });
 const shortName = (run) => run.name.replace(/^.*:|\?.*|\.toml$/g, "");
 
-// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own.
+// Colours stay in sight beside the sliders: at the boxes of the controllers, on a phone in a line of its own, which also
+// says which car fails, since the table is far below.
 function showColours() {
   for (const [name, swatch] of swatches) {
     const run = state.runs.get(name);
     swatch.setAttribute("style", run ? `background:${strokeOf(run)}` : "visibility:hidden"); // its place stays
   }
-  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run))));
+  $("legend").replaceChildren(...[...state.runs.values()].map((run) => element("span", {}, swatchOf(run), shortName(run), run.losses?.length ? element("b", {}, " fails") : "")));
 }
 
 // On a phone the heading is out of sight while a slider moves.

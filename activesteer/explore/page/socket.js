@@ -16,10 +16,15 @@ export class Socket {
       });
       heard(header, arrays);
     };
-    this.socket.onclose = ({ reason }) => lost(reason || "The connection to the program has ended. Start `activesteer explore` again and open its new address.");
+    this.socket.onclose = ({ reason }) => {
+      this.lost = () => lost(reason || "The connection to the program has ended. Start `activesteer explore` again and open its new address.");
+      this.lost();
+    };
   }
 
+  // Without a connection, every message is answered by the reason.
   send(message) {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+    else this.lost?.();
   }
 }

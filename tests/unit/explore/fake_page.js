@@ -1,4 +1,6 @@
 // Just enough of a page to run explore.js without a browser; `sent` has the messages to the program.
+import { Socket as Connection } from "./socket.mjs";
+
 class FakeElement {
   constructor(name) { Object.assign(this, { name, attributes: {}, children: [], listeners: {}, dataset: {}, value: "", checked: false, hidden: false, options: [], textContent: "" }); this.classList = { toggle: () => (this.toggled = !this.toggled) }; }
   setAttribute(key, value) { this.attributes[key] = value; if (["value", "type"].includes(key)) this[key] = String(value); }
@@ -21,20 +23,24 @@ const named = new Map();
 export const $ = (id) => { if (!named.has(id)) named.set(id, new FakeElement(id)); return named.get(id); };
 Object.defineProperty(globalThis, "navigator", { value: {} });
 Object.assign(globalThis, {
-  window: globalThis, location: { hash: "" }, requestAnimationFrame() {}, addEventListener(kind, act) { $("window").addEventListener(kind, act); }, matchMedia: () => ({ matches: false }),
+  window: globalThis, location: { hash: "", href: "http://127.0.0.1:1/token/" }, requestAnimationFrame() {}, addEventListener(kind, act) { $("window").addEventListener(kind, act); }, matchMedia: () => ({ matches: false }),
   history: { replaceState: (_state, _title, address) => { location.hash = address; } },
   document: { body: new FakeElement("body"), querySelectorAll: () => [], getElementById: $, createElement: (name) => new FakeElement(name) },
 });
 export const sent = [];
 export let hear;
-export class Socket { constructor(heard) { hear = heard; } send(message) { sent.push(structuredClone(message)); } }
+let connection;
+class FakeWebSocket { static OPEN = 1; readyState = 1; constructor() { connection = this; } send(text) { sent.push(JSON.parse(text)); } }
+Object.defineProperty(globalThis, "WebSocket", { value: FakeWebSocket });
+export class Socket extends Connection { constructor(heard, lost) { super(heard, lost); hear = heard; } }
+export function disconnect(reason) { connection.readyState = 3; connection.onclose({ reason }); }
 export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
 export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} mark() {} knock() {} lighten() {} draw() {} follow() {} }
 export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
-export class Drive { offer() {} going() {} failed() {} draw() {} show() {} choose() {} }
+export class Drive { offer() {} going() {} failed() {} lost() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };
-export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
+export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, paint = () => "#333", slippery = () => "#333", mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);

@@ -19,7 +19,7 @@ def script(tmp_path: Path, text: str) -> Any:
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: apt-get install nodejs")
-    for name in ("asking", "number"):
+    for name in ("asking", "number", "socket"):
         (tmp_path / f"{name}.mjs").write_text((PAGE / f"{name}.js").read_text("utf-8"))
     imports = 'import { Asking, untickBeyond } from "./asking.mjs";\nimport { number } from "./number.mjs";\n'
     (tmp_path / "test.mjs").write_text(f"{imports}{text}")
@@ -36,7 +36,7 @@ def used(tmp_path: Path, events: str, address: str = "") -> Any:
     (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
     return script(
         tmp_path,
-        f"""import {{ $, describe, drag, finish, hear, sent, slider, start, tick, type }} from "./fake.mjs";
+        f"""import {{ $, describe, disconnect, drag, finish, hear, sent, slider, start, tick, type }} from "./fake.mjs";
         location.hash = {json.dumps(address)};
         await import("./explore.mjs");
         start();
@@ -144,13 +144,33 @@ def test_the_last_lap_on_a_circle_stands_behind_the_stroke(tmp_path: Path) -> No
     page = driven(
         tmp_path,
         f"""{GO} globalThis.seen = [];
-        const see = (more) => {{ frame(more); seen.push(gauge("time")); }};
+        const labels = [], label = (box) => box.children[0].textContent.startsWith("time");
+        const see = (more) => {{
+          frame(more); seen.push(gauge("time"));
+          labels.push($("gauges").children.find(label).children[0].textContent); }};
         drive.rounds = drive.timed = true;
         see({{ lap_s: 5.2, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});
         drive.ghost = {{ lap_s: 20, frames: [{{ time_s: 0, poses: [0, 0, 0] }}] }};
-        see({{ lap_s: 0.4, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});""",
+        see({{ lap_s: 0.4, last_lap_s: null }}); see({{ lap_s: 0.4, last_lap_s: 18.7 }});
+        seen.push(...labels);""",
     )
-    assert page["result"] == ["5.2 s", "0.4 / 18.7 s", "0.4 / 20.0 s", "0.4 / 18.7 s"]
+    assert page["result"][:4] == ["5.2 s", "0.4 / 18.7 s", "0.4 / 20.0 s", "0.4 / 18.7 s"]
+    assert page["result"][4:] == ["time", "time / last lap", "time / ghost", "time / last lap"]
+
+
+def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""const saved = (file) => drive.ended({{ time_s: 3, behind_s: 0, file, folder: "/f", error: "" }});
+        const told = () => $("driven").children[0];
+        {GO} drive.way = "Last lap"; frame({{ lap_s: 1, last_lap_s: 18.57 }});
+        key("r"); saved("first.mcap"); ready(); drive.going();
+        frame({{ last_lap_s: null }}); key("r"); saved("second.mcap"); ready(); drive.going();
+        frame({{ last_lap_s: null }}); $("end").fire("click"); saved("third.mcap");
+        globalThis.seen = [told()]; {GO} frame({{ last_lap_s: null }}); saved("fourth.mcap"); seen.push(told());""",
+    )
+    assert page["result"][0].startswith("Before the restart: last lap 18.57 s, saved as first.mcap. 3.0 s driven")
+    assert page["result"][1].startswith("3.0 s driven")
 
 
 def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
@@ -250,6 +270,22 @@ def test_sliders_of_the_choice_before_cannot_be_moved(tmp_path: Path) -> None:
         $("saved").textContent = JSON.stringify(steps);""",
     )
     assert json.loads(page["saved"]) == [[False, True], [False, False], [True, True], [False, False]]
+
+
+def test_runs_of_two_values_are_never_shown_together(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const steps = [], shown = () => [...window.activesteer.runs.values()];
+        const seen = () => steps.push([$("title").textContent, ...shown().map(({ title }) => title)]);
+        const run = (name, title) => {
+          hear({ kind: "run", id: sent.at(-1).id, name, title, figures: [], losses: [] }, [undefined]); seen(); };
+        const finished = () => { hear({ kind: "finished", id: sent.at(-1).id, command: "", python: "" }, []); seen(); };
+        tick("lqr", true); describe(); run("none", "80"); run("lqr", "80"); finished();
+        drag(83); run("none", "83"); run("lqr", "83"); finished();
+        $("saved").textContent = JSON.stringify(steps);""",
+    )
+    one, both, next_value = ["80", "80"], ["80", "80", "80"], ["83", "83", "83"]
+    assert json.loads(page["saved"]) == [one, both, both, both, both, next_value]
 
 
 def test_a_failed_run_does_not_stop_the_next_value(tmp_path: Path) -> None:
@@ -363,6 +399,28 @@ def test_a_hint_goes_with_the_next_action(tmp_path: Path) -> None:
     assert used(tmp_path, error + "$('save').fire('click');")["message"] == "no such file"  # an error stays
 
 
+@pytest.mark.parametrize("action", [
+    "$('vehicle').fire('change');", "tick('lqr', true);", "drag(90);", "$('reset').fire('click');",
+    "location.hash = '#drive=slalom'; $('window').fire('hashchange');",
+])  # fmt: skip
+def test_after_the_connection_is_lost_every_choice_says_so(action: str, tmp_path: Path) -> None:
+    page = used(tmp_path, f"disconnect('opened in another window'); $('close').fire('click'); {action}")
+    assert page["sent"] == []
+    assert page["message"] == "opened in another window"
+    assert page["state"] == ""
+
+
+def test_without_a_connection_no_car_is_prepared(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} frame(); drive.socket.send = () => drive.lost(); drive.lost();
+        const seen = [$("start").textContent, $("start").disabled, $("end").hidden, drive.running];
+        $("course").fire("change"); globalThis.seen = [...seen, $("start").textContent];""",
+    )
+    told = "Cannot drive: no connection"
+    assert page["result"] == [told, True, True, False, told]
+
+
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     page = used(
         tmp_path,
@@ -374,6 +432,47 @@ def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
         $("saved").textContent = JSON.stringify($("figures").querySelectorAll("td").map(({ words }) => words));""",
     )
     assert json.loads(page["saved"]) == ["lost", "lost", "3.00"]
+
+
+def test_a_car_that_fails_is_named_next_to_the_sliders(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const run = (name, losses) =>
+          hear({ kind: "run", id: before.at(-1).id, name, title: "", figures: [], losses }, [undefined]);
+        run("none", ["lost"]); run("ars", []);
+        hear({ kind: "run", id: before.at(-1).id, name: "afs", title: "", error: "no such file" }, []);
+        const bold = (one) => one.querySelectorAll("b").map(({ words }) => words);
+        $("saved").textContent = JSON.stringify($("legend").children.map((one) => [one.words, ...bold(one)]));""",
+    )
+    assert json.loads(page["saved"]) == [["none", " fails"], ["ars"], ["afs"]]
+
+
+def test_a_front_axle_that_slides_without_the_rear_one_is_told(tmp_path: Path) -> None:
+    curves = (PAGE / "curves.js").read_text("utf-8").replace("./look.js", "./fake.mjs")
+    (tmp_path / "curves.mjs").write_text(curves)
+    (tmp_path / "fake.mjs").write_text(Path(__file__).with_name("fake_page.js").read_text("utf-8"))
+    told = script(
+        tmp_path,
+        """import { Curves } from "./curves.mjs";
+        import { element } from "./fake.mjs";
+        const title = "Slip angle of the axles", figure = element("figure");
+        figure.appendChild = (child) => child;
+        const run = (front, rear) => ({ plots: { start_s: 0, step_s: 0.5, panels: [{ title, series: [
+          { dotted: false, values: rear }, { dotted: true, values: front }] }] } });
+        const of = (...runs) => {
+          const one = { plots: new Map([[title, { figure }]]), runs: new Map(runs), limit: () => 7.5 };
+          Curves.prototype.tellSlip.call(one);
+          return one.plots.get(title).told.textContent;
+        };
+        const spins = ["none", run([0, -9, -9], [0, 2, 8])], pushes = ["afs", run([0, 2, -9], [null, 1, 1])];
+        const grips = ["ars", run([0, 2, 2], [0, 1, 1])];
+        console.log(JSON.stringify([of(spins, pushes, grips), of(pushes), of(grips, ["lqr", { error: "no" }])]));""",
+    )
+    assert [text.partition("Rear axle ")[2] for text in told] == [
+        "beyond it: none from 1.00 s. Only front axle beyond it: afs from 1.00 s.",
+        "beyond it: no run. Only front axle beyond it: afs from 1.00 s.",
+        "beyond it: no run.",
+    ]
 
 
 def test_saved_files_are_named_next_to_the_button(tmp_path: Path) -> None:

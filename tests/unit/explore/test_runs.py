@@ -79,6 +79,13 @@ def test_a_search_that_fails_keeps_the_amplitude_which_command_and_title_give(
     if maneuver != "fishhook":  # its title is in words
         assert f"{angle:.3g} deg" in kept.header["title"]
         assert f" {angle:.0f} deg" in kept.header["note"]
+    if factor := values.get("steer.amplitude_factor"):  # the slider of the factor still moves the amplitude
+        assert f"A, the steering wheel angle at 0.3 g, stays at {angle / factor:.1f} deg" in kept.header["note"]
+        more = {**values, "steer.amplitude_factor": factor + 1.0}
+        (run, done) = runs.run(RunRequest(**choice, values=more), lambda: False)
+        now = float(done.header["command"].partition(f"{key}=")[2].split()[0])
+        assert now == pytest.approx(angle * (factor + 1.0) / factor, rel=1e-5)  # the command gives six digits
+        assert f"stays at {angle / factor:.1f} deg" in run.header["note"]
     repeated = {**values, key: angle}
     repeated.pop("steer.amplitude_factor", None)
     again = activesteer.simulate(maneuver, "none", overrides=repeated)
