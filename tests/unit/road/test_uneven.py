@@ -194,7 +194,7 @@ def test_bytes_lost_as_text_are_an_error() -> None:
         (lambda d: d.__setitem__((4, 3), np.nan), "has a hole"),
         (lambda d: d.__setitem__((4, slice(2, 5)), np.nan), "no height at all"),
         (lambda d: d.__setitem__((slice(1, 9), 0), 0.6 * np.arange(8)), "folds over itself"),
-        (lambda d: d.__setitem__((4, 3), 5000.0), "above 1000 m"),
+        (lambda d: d.__setitem__((4, 3), 5000.0), "exceed 1000 m"),
         (lambda d: d.__setitem__((4, 3), np.inf), "not a finite number"),
         (lambda d: d.__setitem__((3, 0), np.nan), "heading of the reference line"),
     ],
