@@ -83,7 +83,7 @@ make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does no
 _SURPRISING: Final = 4.0
 """Squared error over its expected variance above which a value is not used for the stiffness and for the offset of the
 accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
-offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by a tenth."""
+offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by 0.1."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth
 of a second one axle stands on the old one. Of 0.1, 0.2 and 0.3, chosen by the error of the sideslip angle."""

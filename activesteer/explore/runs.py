@@ -37,7 +37,6 @@ from activesteer.road.course import Footprint
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
 from activesteer.scenario import Scenario, resolve, value_of
-from activesteer.scenario.run_context import slip_limit_deg
 from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
@@ -258,7 +257,6 @@ class Runs:
         for name in choice.controllers:
             look = looks[name]
             run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
-            run["slip_limit_deg"] = slip_limit_deg(scenario)
             run |= {"title": (scenario.maneuver.title or choice.maneuver) + held, "note": note}
             try:
                 controller = controller_spec(self.folder.located(name))

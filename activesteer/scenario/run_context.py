@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -53,7 +52,7 @@ class RunContext(NamedTuple):
             **({"controller_uses_truth": True} if controller.uses_truth else {}),
             **({"controller_interval_s": own_s} if own_s != vehicle.timestep_s else {}),
             "car": vehicle.dimensions(),
-            **({} if (slip_deg := slip_limit_deg(scenario)) is None else {"slip_limit_rad": math.radians(slip_deg)}),
+            **({} if (slip_rad := slip_limit_rad(scenario)) is None else {"slip_limit_rad": slip_rad}),
             "timestep_s": vehicle.timestep_s,
             "versions": _versions(),
         }
@@ -92,24 +91,23 @@ def _versions() -> dict[str, str]:
     return found
 
 
-_LARGEST_SLIP_DEG: Final = 20.0
-"""Largest slip angle that is looked at [deg]: beyond 15 to 20 deg, no tyre file has measured values."""
+_SLIPS_RAD: Final = np.radians(np.arange(0.5, 20.0, 0.1))
+"""Slip angles that are compared [rad]: beyond 15 to 20 deg, no tyre file has measured values."""
 _CLEAR_DROP: Final = 0.01
 """Share by which the side force must fall behind its largest value. A flat curve has no slip angle to warn of."""
 _SPEED_MPS: Final = 20.0
 """Speed of the wheel [m/s]; the side force hardly depends on it."""
 
 
-def slip_limit_deg(scenario: Scenario) -> float | None:
-    """Return the slip angle of the largest side force of a rear tyre [deg], None for a flat curve or two frictions."""
+def slip_limit_rad(scenario: Scenario) -> float | None:
+    """Return the slip angle of a rear tyre's largest side force [rad], None for a flat curve or several frictions."""
     road = scenario.maneuver.road
-    if is_overruled(road, "mu"):
+    if is_overruled(road, "mu") or road.patches:
         return None
     tyre, load_N = scenario.car.tyres[1], scenario.car.config.single_track.wheel_loads_N[1]
-    angles_deg = np.arange(0.5, _LARGEST_SLIP_DEG, 0.1)
     friction = road.mu / tyre.conventions.reference_friction
-    forces = MagicFormula(tyre).evaluate(load_N, 0.0, np.radians(angles_deg), vx_mps=_SPEED_MPS, road_friction=friction)
+    forces = MagicFormula(tyre).evaluate(load_N, 0.0, _SLIPS_RAD, vx_mps=_SPEED_MPS, road_friction=friction)
     force_N = np.abs(forces.fy_N)
     largest = int(np.argmax(force_N))
     clear = force_N[-1] < (1.0 - _CLEAR_DROP) * force_N[largest]
-    return round(float(angles_deg[largest]), 1) if clear else None
+    return float(_SLIPS_RAD[largest]) if clear else None

@@ -92,7 +92,7 @@ export class Curves {
     shown.told.textContent = limit == null ? "" : `Shaded, beyond ${number(limit, 1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${rear.join(", ") || "no run"}.${front.length ? ` Only front axle beyond it: ${front.join(", ")}.` : ""}`;
   }
 
-  limit() { return [...this.runs.values()].find((run) => run.plots)?.slip_limit_deg ?? null; }
+  limit() { return [...this.runs.values()].find((run) => run.plots)?.plots.slip_limit_deg ?? null; }
 
   // Shade the slip angles beyond that of the largest side force, and mark where each rear axle passes it.
   shade(u) {

@@ -24,7 +24,7 @@ from activesteer.maneuver import KINDS
 from activesteer.maneuver.steering_tests import StepSteer
 from activesteer.resources import find_vehicle, list_maneuvers, list_vehicles, models_dir
 from activesteer.scenario import VehicleConfig, describe, load_car, resolve
-from activesteer.scenario.run_context import slip_limit_deg
+from activesteer.scenario.run_context import slip_limit_rad
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.tyre.evaluation import MagicFormula
 from tests.raising import raises
@@ -351,12 +351,13 @@ def test_model_and_tyre_beside_the_vehicle_file_come_before_the_shipped_ones(veh
 
 def test_less_friction_gives_a_smaller_slip_angle_of_the_largest_side_force() -> None:
     scenario = resolve("step_steer")
-    dry, snow = (slip_limit_deg(resolve("step_steer", overrides={"road.mu": mu})) for mu in (0.9, 0.3))
+    dry, snow = (slip_limit_rad(resolve("step_steer", overrides={"road.mu": mu})) for mu in (0.9, 0.3))
     assert dry is not None
-    assert dry == pytest.approx(7.5, abs=0.5)
-    assert snow == pytest.approx(2.5, abs=0.5)
+    assert dry == pytest.approx(math.radians(7.5), abs=math.radians(0.5))
+    assert snow == pytest.approx(math.radians(2.5), abs=math.radians(0.5))
     rear, load_N = MagicFormula(scenario.car.tyres[1]), scenario.car.config.single_track.wheel_loads_N[1]
-    before, at, after = (abs(rear.evaluate(load_N, 0.0, math.radians(dry + more)).fy_N) for more in (-3.0, 0.0, 3.0))
+    before, at, after = (abs(rear.evaluate(load_N, 0.0, dry + math.radians(more)).fy_N) for more in (-3.0, 0.0, 3.0))
     assert max(before, after) < at
-    assert slip_limit_deg(resolve("step_steer", "bmw_m8", {"road.mu": 0.9})) is None  # its curve is flat
-    assert slip_limit_deg(resolve("split_mu_braking")) is None  # it has two frictions
+    assert slip_limit_rad(resolve("step_steer", "bmw_m8", {"road.mu": 0.9})) is None  # its curve is flat
+    for name in ("split_mu_braking", "mu_jump"):  # they have several frictions
+        assert slip_limit_rad(resolve(name)) is None
