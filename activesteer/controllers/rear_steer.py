@@ -71,7 +71,7 @@ def predicted(block: RearPrediction, front_steer_rad: float, speed_mps: float) -
 
 
 class RearSteer(NativeBlock):
-    """Active rear steering (ARS): prediction less correction, limited.
+    """Active rear steering (ARS): prediction minus correction, limited.
 
     Lag and rate limit belong to the actuator, in the vehicle.
     """

@@ -82,7 +82,7 @@ class Range(NamedTuple):
 
 
 def _left_by(slip: float) -> float:
-    """Return the fraction of a torque that traction leaves for a wheel slipping in the torque's direction."""
+    """Return the fraction of a torque that is allowed for a wheel that slips in the direction of the torque."""
     return min(max((_MOST_SLIP - slip) / (_MOST_SLIP - _FREE_SLIP), 0.0), 1.0)
 
 

@@ -20,7 +20,7 @@ class DriverParameters:
     title: str = ""
     """One line for lists."""
     preview_s: Annotated[float, Range(0.2, 5.0)]
-    """Time ahead for which the driver sees the path [s]. He takes it for straight beyond."""
+    """Time ahead for which the driver sees the path [s]. Beyond this time, the driver assumes a straight path."""
     preview_points: Literal["all", "one"] = "all"
     """Points of the path that the driver looks at: `all` within the preview, or the `one` at its end, as simple driver
     models do. The one point has the sum of the gains of all."""

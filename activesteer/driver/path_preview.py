@@ -1,10 +1,10 @@
 """The driver on a path: a linear-quadratic regulator with preview.
 
-The driver knows a single-track model of the car, the lag of the arms and the reaction delay. He weighs the offset from
-the path against the steering wheel rate, over all future time. The optimal steering is linear in the motion of the car,
-in the decisions that wait, and in the path at each time of the preview; its gains are computed once for each speed. He
-decides at every look. A decision reaches the steering wheel after the reaction delay and the neuromuscular lag, within
-limits of rate and angle.
+The driver knows a single-track model of the car, the lag of the arms and the reaction delay. The regulator weighs the
+offset from the path against the steering wheel rate, over all future time. The optimal steering is linear in the motion
+of the car, in the pending decisions, and in the path at each time of the preview. Its gains are computed once for each
+speed. The driver decides at every look. A decision reaches the steering wheel after the reaction delay and the
+neuromuscular lag, within limits of rate and angle.
 
 Sources: R. S. Sharp and V. Valtetsiotis, Optimal preview car steering control, Vehicle System Dynamics 35 supplement
 (2001), 101-117; D. J. Cole, A. J. Pick and A. M. C. Odhams, Predictive and linear quadratic methods for potential
@@ -139,7 +139,7 @@ class PathPreviewDriver(NativeBlock):
             self._note(rounded, row)
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command of the driver. Without a path he repeats his last decisions."""
+        """Return the command of the driver. Without a path, the driver repeats the last decisions."""
         path = setpoint.path
         if self._steps % self._preview_every_steps == 0 and path is not None:
             decided = self._decided_rad

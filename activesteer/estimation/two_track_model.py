@@ -135,7 +135,7 @@ def forces_of(known, tyres, memory, state):
 
 @inlined
 def slip_angles(known, memory, state, vx_mps):
-    """Return the slip angles of both axles from only the motion of the car [rad]."""
+    """Return the slip angles of both axles that follow from the motion of the car only [rad]."""
     across_mps, rate_radps = state[LATERAL_SPEED], memory.roll_rate_radps
     front_mps = across_mps + known.front_roll_arm_m * rate_radps + known.cg_to_front_m * state[YAW_RATE]
     rear_mps = across_mps + known.rear_roll_arm_m * rate_radps - known.cg_to_rear_m * state[YAW_RATE]

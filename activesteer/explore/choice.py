@@ -46,7 +46,7 @@ class Folder:
         self.path = path
 
     def names(self) -> dict[str, list[str]]:
-        """Return the names of manoeuvres, vehicles, drivers and controllers, with those of the folder last."""
+        """Return the names of manoeuvres, vehicles, drivers and controllers, with the names in the folder last."""
         names = _of_package()
         files = sorted([*self.path.glob("*.toml"), *self.path.glob("*.py"), *self.path.glob("vehicles/*/*.toml")])
         for file in files:

@@ -89,7 +89,7 @@ class Slider(NamedTuple):
 
 
 def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Path] | None = None) -> list[Slider]:
-    """Return the sliders of a run, with all numbers of the user's file for groups in `own`."""
+    """Return the sliders of a run. A group in `own` gets a slider for every number in the user's file."""
     found = [*_of("manoeuvre", scenario, _MANEUVER), *_of("car", scenario, _CAR)]
     for group, file in (own or {}).items():
         found += _of_file(group, scenario, file)
@@ -113,7 +113,7 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
-    """Yield sliders of the positive numbers in a file, from half to twice each number."""
+    """Yield a slider for each positive number in a file, from half to twice its value."""
     table = tomllib.loads(file.read_text("utf-8"))
     for path, given in leaves(table).items():
         key = ".".join(path)

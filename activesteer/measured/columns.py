@@ -252,7 +252,7 @@ def _in_child(path: Path) -> list[Column]:
 
 
 def make_answerer() -> Callable[[bytes], bytes]:
-    """Return the function that answers in the child process."""
+    """Return a function that answers requests in the child process."""
     # A request is JSON: the path of a file that is opened, or the number of a column that is read. An answer is a line
     # of JSON, then values and times of a column as 64-bit floating-point numbers.
     opened: list[Column] = []

@@ -161,7 +161,7 @@ class MeasuredFile:
         return {key: getattr(self.table.circle, key) for key in CIRCLE_KEYS} | self.table.overrides
 
     def changed(self, case: dict[str, Any], *changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a case with overrides, where varied numbers are changed by their difference from the files."""
+        """Return a case with overrides. A varied number is shifted by the difference of its override from the files."""
         for change in changes:
             numbers = {key: self.nominal[key] for key in change if key in self.nominal}
             added = {key: case.get(key, own) + (change[key] - own) for key, own in numbers.items()}

@@ -47,13 +47,13 @@ def written_unit(unit: str) -> Unit | None:
 
 
 def bracketed(name: str) -> tuple[str, str]:
-    """Split a name and the string in brackets behind it, or an empty string."""
+    """Return a name without the brackets at its end, and the string in the brackets or an empty string."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     return (found[1], found[2]) if found else (name, "")
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Split a name and the unit in brackets behind it."""
+    """Return a name without the unit in brackets at its end, and the unit or an empty string."""
     words, unit = bracketed(name)
     return (words, unit) if unit and written_unit(unit) else (name, "")
 
@@ -64,7 +64,7 @@ def is_time(name: str) -> bool:
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> tuple[str, str, float, bool] | None:
-    """Return the channel that a column means by its name, or None.
+    """Return the channel that the name of a column stands for, or None.
 
     That is the channel that it fills, its unit if the file states none, -1 if the exporter uses the sign opposite to
     ISO 8855, and whether the unit is the exporter's; otherwise SI is assumed.

@@ -350,7 +350,7 @@ def find(given: Any, kind: Kind) -> Plugin:
 
 
 def allowed(plugin: Plugin) -> Plugin:
-    """Return a plug-in, or reject a class with the name of a built-in block or of a table of its keys."""
+    """Return a plug-in, or reject it if its class has the name of a built-in block or of a table of keys."""
     if plugin.key in (reserved := (*plugin.kind.names(), *plugin.kind.reserved)):
         problem = f"a {plugin.kind.word} of your own cannot have the name {plugin.key!r}; rename it"
         raise plugin.kind.fail(plugin.name, problem, plugin.key, reserved)

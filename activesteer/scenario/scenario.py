@@ -388,7 +388,7 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
 
 
 def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
-    """Return a manoeuvre with the course object of another one, so that a driver stays on his path."""
+    """Return a manoeuvre with the course object of another one, so that a driver stays on the path."""
     if before.course is not None:
         vars(after)["course"] = before.course
     return after

@@ -207,7 +207,7 @@ class ClosedLoop(Uncopyable):
 
     @property
     def driver(self) -> Any:
-        """Driver of the loop. You may replace him from the next step on."""
+        """Driver of the loop. You may replace it from the next step on."""
         self._store()
         return self.blocks[0]
 

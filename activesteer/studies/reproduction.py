@@ -149,7 +149,7 @@ def write_page(results: Iterable[Reproduction], folder: Path) -> Path | None:
 
 
 def draw_figures(recordings: Mapping[str, Mapping[str, Any]], folder: Path, vehicle: str) -> list[Path]:
-    """Draw all figures for which runs are complete, and the figure of the suspension."""
+    """Draw all figures whose runs are complete, and the figure of the suspension."""
     files = draw_runs(recordings, folder)
     camber = rear_camber_figure(kinematics_compliance(vehicle))
     files += [save(camber, folder / f"figure_01_rear_camber{ending}") for ending in FORMATS]

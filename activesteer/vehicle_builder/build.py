@@ -154,7 +154,7 @@ def _measurements(kinds: dict[str, AxleKind], kc: str | os.PathLike[str] | None)
 
 
 def _drive(folder: Path, car: CarDesign, trimmed: Trimmed) -> list[str]:
-    """Drive the standing car and write its two-track properties, or return the reason of a failure."""
+    """Drive the standing car and write its two-track properties, or return the reason for a failure."""
     file = folder / f"{car.name}.toml"
     try:
         found = two_track_of(file, run_scenario)

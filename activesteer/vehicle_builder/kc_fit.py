@@ -268,7 +268,7 @@ def _over_travel(
 def _over_rack(
     samples: Samples, radius_m: float, over_travel: dict[str, tuple[float, ...]], travel: Array, rough: dict[str, float]
 ) -> dict[str, tuple[float, ...]]:
-    """Return the curves versus rack travel, less the effect of the wheel travel during the sweep."""
+    """Return the curves versus rack travel, minus the effect of the wheel travel during the sweep."""
     rack = np.round(np.linspace(samples.x.min(), samples.x.max(), _POINTS), 6)
     lifted = samples.moved("travel")
 

@@ -92,7 +92,7 @@ def _table(
 
 
 def _curves(car: CarDesign, trimmed: Trimmed) -> dict[str, Any]:
-    """Return the tables [curves.front] and [curves.rear], empty for axles of links."""
+    """Return the tables [curves.front] and [curves.rear], empty for axles with links."""
     guided = {axle.name: curves for axle in car.axles if (curves := trimmed.axle(axle.name).curves) is not None}
     tables = {name: in_degrees(to_table(curves, defaults=False)) for name, curves in guided.items()}
     return {"curves": tables} if tables else {}

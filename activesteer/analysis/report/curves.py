@@ -84,7 +84,7 @@ def _marks(group: Group) -> list[tuple[float, str]]:
 
 
 def _slip_limit_deg(group: Group) -> float | None:
-    """Return the slip angle of the largest side force of the rear tyres [deg], if it is one throughout all runs."""
+    """Return the slip angle of the largest side force of the rear tyres [deg], if it is the same in all runs."""
     limits: set[Any] = {run.recording.metadata.get("slip_limit_rad") for run in group.runs}
     if len(limits) > 1 or None in limits or any(event.kind == "set" for run in group.runs for event in run.events):
         return None

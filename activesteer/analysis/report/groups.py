@@ -87,7 +87,7 @@ class ReportedRun(NamedTuple):
 
     @property
     def result(self) -> str:
-        """Result of a drive, such as the time of its last lap, which its last event holds; empty for none."""
+        """Result of a drive from its last event, such as the time of the last lap. Empty if there is none."""
         last = events_of(self.recording.metadata)[-1:] if self.by_hand else []
         end_s = self.recording.time_s[-1]
         return "".join(event.what for event in last if event.kind == "note" and event.time_s >= end_s)

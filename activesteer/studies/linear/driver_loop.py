@@ -1,9 +1,9 @@
 """The loop of driver and car: linear analysis, and run with a small step of the path.
 
 The loop consists of the linearised car (`linearisation`), the controller's linear form with its corrector fully active
-(`controllers.linear_form`), and the driver: his control law about a straight path, decided every 10 ms, a reaction
-delay of whole decisions, which he knows, and the lag of his arms. One period of 10 ms, ten steps of the engine,
-becomes one matrix. The only approximation is that the motion is small.
+(`controllers.linear_form`), and the driver. The driver has a control law about a straight path, decided every 10 ms, a
+known reaction delay of whole decisions, and the lag of the arms. One period of 10 ms, ten steps of the engine, becomes
+one matrix. The only approximation is that the motion is small.
 
 The loop is opened at the steering wheel, between the driver's arms and the car, for the crossover frequency and the
 phase margin. The damping belongs to the oscillation after a small step of the path.
@@ -117,7 +117,7 @@ class DriverLoop:
     """Loop of driver and car over one period of the driver.
 
     Opened at the steering wheel: x[k+1] = A x[k] + B w, where w are the car's steering wheel angles in the steps of the
-    period; the angles from the driver are C x[k]. His knowledge of his own decisions stays in A.
+    period; the angles from the driver are C x[k]. The driver's knowledge of the earlier decisions stays in A.
     """
 
     a: Array  # system matrix of the open loop, shape (n, n)

@@ -221,7 +221,7 @@ def _take(rows, start, count, copies, input_copies, forces, actuators, out, inpu
 
 @compiled_call(types.boolean, _ROWS, _COPIES, _COPIES, _FORCES, _ACTUATORS, _ARRAY, _ARRAY, types.float64)
 def take_rows(rows, copies, input_copies, forces, actuators, out, inputs, largest):
-    """Compute all channels of compiled code."""
+    """Compute all channels that compiled code provides."""
     good, whole = True, len(out) - len(out) % _ROWS_AT_ONCE
     # The compiler knows this count and keeps these rows of a column in one register.
     for start in range(0, whole, _ROWS_AT_ONCE):
