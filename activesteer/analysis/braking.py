@@ -132,8 +132,8 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
           `yaw_rate_begin_radps`, `radius_begin_m`.
         - `mean_deceleration_mps2`: until standstill, release of the pedal, or the end of the run.
         - `yaw_rate_after_1000ms_radps`: 1 s after the start of braking.
-        - `yaw_rate_deviation_after_1000ms_radps`: the same less the yaw rate that keeps the car on the circle at its
-          present speed, in the direction of the turn; above 0 the car turns in.
+        - `yaw_rate_deviation_after_1000ms_radps`: the same minus the yaw rate that keeps the car on the circle at its
+          current speed, in the direction of the turn; above 0 the car turns in.
         - `path_deviation_after_1000ms_m`: distance of the centre of gravity from the circle, outwards positive.
         - `yaw_rate_peak_abs_radps`, `sideslip_peak_abs_rad`: from the start of braking on; sideslip above
           10 km/h.

@@ -1,8 +1,8 @@
 """Steady-state handling (ISO 4138) from a slow ramp, at constant speed or on a constant radius.
 
 The understeer gradient is the gradient of the steer angle (steering wheel over overall ratio) over lateral
-acceleration, less the gradient of the Ackermann angle l/R. With the measured curvature, yaw rate over speed, both tests
-give the same line:
+acceleration, minus the gradient of the Ackermann angle l/R. With the measured curvature, yaw rate over speed, both
+tests give the same line:
 
     steering wheel / ratio - l * yaw rate / speed = offset + EG * lateral acceleration
 

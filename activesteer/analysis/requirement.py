@@ -2,10 +2,9 @@
 
 An example is `max(0, lane_overstep_m(lqr)) - max(0, lane_overstep_m(none)) <= 0.05`. `METRIC(CONTROLLER, MANEUVER)` is
 the metric of that run; the manoeuvre may be left out if there is only one. The ending of the name gives the unit: SI
-units, or those of keys in files, such as `sideslip_peak_abs_deg`.
-`harm(CONTROLLER)` is the largest growth of a measure of harm against `none`, in multiples of its size
-(`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are allowed; comparisons may be joined by `and` and `or`.
-`claim(S1)` is a statement of the paper.
+units, or the units of keys in files, such as `sideslip_peak_abs_deg`. `harm(CONTROLLER)` is the largest growth of a
+measure of harm against `none`, in multiples of its size (`analysis.harm`). `+ - * /`, `min`, `max` and `abs` are
+allowed; comparisons may be joined by `and` and `or`. `claim(S1)` is a statement of the paper.
 
 The *margin* of a comparison is its distance to the limit, in multiples of the limit, or in its own unit for a limit of
 0. It is negative if the comparison is violated, and not defined (nan) if a metric is not. `and` takes the smallest

@@ -1,9 +1,9 @@
 """Metrics of a sine with dwell by FMVSS 126 and UN Regulation 140.
 
 The two yaw rate ratios count from the *completion* of steer, the end of the sine. The lateral displacement counts from
-the *beginning* of steer. Steering wheel angle and yaw rate are filtered as in the standards (10 and 6 Hz, twelve poles,
-no phase). The filter rounds the corner at the end of the sine, which shifts the completion by some 0.015 s, here as in
-a measured test. The evaluation differs from that of a measured test in three points:
+the *start* of steer. Steering wheel angle and yaw rate are filtered as in the standards (10 and 6 Hz, twelve poles, no
+phase). The filter rounds the corner at the end of the sine, which shifts the completion by some 0.015 s, here as in a
+measured test. The evaluation differs from the evaluation of a measured test in three points:
 
 - Nothing is zeroed: simulated signals have no offset.
 - The displacement comes from the recorded position, which is exact. The standards integrate the lateral acceleration
@@ -123,8 +123,8 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         - `yaw_rate_reversal_peak_radps`: first peak of the yaw rate after the reversal, with its sign; and its time.
         - `yaw_rate_after_1000ms_share`, `yaw_rate_after_1750ms_share`: yaw rate so long after the completion of steer,
           as a fraction of this peak; below zero if the car turns the other way by then.
-        - `lateral_displacement_m`: displacement of the centre of gravity 1.07 s after the beginning of steer, across
-          the heading at that beginning, positive to the side of the first half.
+        - `lateral_displacement_m`: displacement of the centre of gravity 1.07 s after the start of steer, across the
+          heading at the start, positive to the side of the first half.
         - `lateral_displacement_by_ay_m`: the same from the lateral acceleration, as in the standards.
         - `<name>_peak_abs_<unit>`: over the whole run, sideslip above 10 km/h; `heading_end_rad`, against its first
           sample.

@@ -1,7 +1,7 @@
 """Allocation of a required yaw moment and side force to both steer angles, within their limits and rates.
 
 The state feedback of `lqr` wants the angles u_l without limits: a yaw moment M(u_l) and a side force F(u_l), by the
-slopes of the axle curves at the present slip angles. The angles minimise
+slopes of the axle curves at the current slip angles. The angles minimise
 
     ((M(u) - M(u_l)) / M_0)^2 + ((F(u) - F(u_l)) / F_0)^2 + |(u - u_l) / s|^2
 

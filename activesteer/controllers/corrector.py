@@ -41,7 +41,7 @@ def cut_off(angle_rad: float, limit_rad: float) -> tuple[float, int]:
 class Corrector(NativeBlock):
     """PID controller for the yaw rate error beyond the tolerance band.
 
-    With the proportional gain alone it is the P corrector of the paper. The integral stops growing towards an active
+    With only the proportional gain it is the P corrector of the paper. The integral stops growing towards an active
     limit, and it fades with the tolerance function.
     """
 

@@ -1,12 +1,12 @@
 """Electronic stability control with the brakes of individual wheels (FMVSS 126).
 
-S4 of the standard requires brake torques at single wheels that make a yaw moment; yaw rate, sideslip and the driver's
+S4 of the standard requires brake torques at single wheels that create a yaw moment; yaw rate, sideslip and the driver's
 angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
 
     M_z = J_z / T_r (error beyond its band) + J_z / T_b^2 (sideslip beyond its limit)
 
-with the error of desired less actual yaw rate. The outer front wheel makes a moment against the turn (oversteer), which
-also lowers its side force. The inner rear wheel makes a moment with the turn (understeer):
+with the error of the yaw rate, desired minus actual. The outer front wheel creates a moment against the turn
+(oversteer), which also lowers its side force. The inner rear wheel creates a moment with the turn (understeer):
 
     brake torque = |M_z| rolling radius / (half the track)
 

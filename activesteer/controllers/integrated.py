@@ -1,7 +1,7 @@
 """Integrated control of rear steering, front superposition and brakes, with priority for the steering.
 
-The angles are those of `lqr` with its allocation, within their limits and rates (`controllers/allocation.py`). The law
-of `esc` gives the yaw moment that the car needs to stay under control, beyond its bands:
+The angles come from `lqr` with its allocation, within their limits and rates (`controllers/allocation.py`). The law of
+`esc` gives the yaw moment that the car needs to stay under control, beyond its bands:
 
     M_s = J_z (error beyond its band) / T_r + J_z (sideslip beyond its limit) / T_b^2
 
@@ -23,10 +23,10 @@ wheel against understeer. The cost c of a brake force keeps the brakes idle for 
 On a road of two sides the anti-lock system holds back the brakes of the better side, to help the driver. Here the
 steering compensates the moment of the brakes (see `lqr`), so the sides may differ more. The controller sets this
 pressure difference: a limit that falls with the errors of the car, and at most what the remaining angles can hold with
-the tyres in their present state. It falls in turns too: there the outer rear wheel needs its side force.
+the tyres in their current state. It falls in turns too: there the outer rear wheel needs its side force.
 
 If an actuator does not follow its demand (`SupervisedActuator`), it holds its position. The state feedback is then
-computed for the other actuator alone, about the turn that is still possible. The controller gets no message about a
+computed only for the other actuator, about the turn that is still possible. The controller gets no message about a
 fault.
 
 Both demands of the steering fade while the estimator does not explain the car (see `lqr`), M_x only while it does not

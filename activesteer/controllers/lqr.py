@@ -21,7 +21,7 @@ turn of new tyres, its rear axle could slide on snow. So as far as the friction 
 by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle. Both axles then turn by
 the same angle, which leaves the yaw rate as it is.
 
-u* are the angles of the turn at the time when the present demand takes effect, a lag T_a and a call ahead. The law is
+u* are the angles of the turn at the time when the current demand takes effect, a lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
 
@@ -30,7 +30,7 @@ hold the inverse squares of the errors and angles that cost the same (Bryson's r
 and interpolated. The estimator gives yaw rate and sideslip, sensors give the actuators, and the model gives f and g.
 
 If an actuator has failed, its angle is given: f* or g* is then its position. The other angle and the unavoidable
-sideslip beta* solve 0 = A [r*, beta*] + B [f*, g*], and K is computed for the other actuator alone.
+sideslip beta* solve 0 = A [r*, beta*] + B [f*, g*], and K is computed only for the other actuator.
 
 The model is valid up to about 6 Hz, where body, suspensions and steering column move. R is chosen for a slower loop:
 its disk margin, opened at both demands, is to be at least 0.5 from 60 to 160 km/h. This holds for the estimator with

@@ -1,13 +1,13 @@
 """Torque vectoring: a yaw moment from the difference of the drive torques of an axle's wheels.
 
-Desired yaw rate and estimator are those of `esc`. The moment removes the errors in given times:
+Desired yaw rate and estimator are the same as in `esc`. The moment removes the errors in given times:
 
     M_z = J_z (r* - r) / T_r + J_z / T_b^2 (sideslip beyond its limit)
 
-A difference q, the right torque less the left one, makes the moment q t / (2 R), with track t and rolling radius R.
-More torque on the right turns the car to the left. Each axle whose torques can differ gets the same fraction of its
-largest difference. The driver's torque stays: half of q is added on the right and taken from the left. If one wheel is
-at its limit, the other one takes the rest. The limits of a wheel are
+A difference q, right torque minus left torque, creates the moment q t / (2 R), with track t and rolling radius R. More
+torque on the right turns the car to the left. Each axle whose torques can differ gets the same fraction of its largest
+difference. The driver's torque stays: half of q is added on the right and taken from the left. If one wheel is at its
+limit, the other one takes the rest. The limits of a wheel are
 
     motor       |T| <= min(T_max, P / n); for T n < 0 times the regeneration
     friction    |T| <= R F_z mu max(sqrt(u^2 - (a_y / (g mu))^2), s)
@@ -21,7 +21,8 @@ Unlike the brakes of `esc`, the moment costs no speed, so the controller acts at
 within some 15 ms, faster than hydraulics.
 
 Source: L. De Novellis, A. Sorniotti, P. Gruber, Wheel torque distribution criteria for electric vehicles with
-torque-vectoring differentials, IEEE Trans. Vehicular Technology 63 (2014); the law is that of `esc` without its band.
+torque-vectoring differentials, IEEE Trans. Vehicular Technology 63 (2014). The law is the law of `esc` without
+its band.
 """
 
 from __future__ import annotations

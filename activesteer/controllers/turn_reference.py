@@ -69,8 +69,8 @@ class BorneTurnReference(TurnReference):
 
     A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
     measured |a_y| is short of v |r*| by more than D, the desired yaw rate r* falls by the rest over v, at most to zero.
-    The compared r* lies behind a lag T_a, and does not exceed the present one. Without this rule, a yaw moment turns a
-    car whose front wheels have reached ice further in, and the car slides when its rear wheels reach the ice too: the
+    The compared r* passes a lag T_a, and does not exceed the current r*. Without this rule, a yaw moment turns a car
+    whose front wheels have reached ice further in, and the car slides when its rear wheels reach the ice too: the
     estimated friction comes late, and it is one number for both axles.
 
     Source: R. Rajamani, Vehicle Dynamics and Control, 2012, section 8.3.3, on a_y = v (r + d beta/dt) and the desired

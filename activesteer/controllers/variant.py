@@ -41,7 +41,7 @@ class Variant:
         name: Short name.
         title: One line for lists.
         system: Name of the controller in `CONTROLLERS`.
-        gains: Keys of the table [controllers] that replace those of the vehicle file.
+        gains: Keys of the table [controllers] that replace the keys of the vehicle file.
         source: The file.
     """
 

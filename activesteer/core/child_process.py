@@ -22,7 +22,7 @@ from collections.abc import Callable
 from typing import Final
 
 _LENGTH: Final = struct.Struct("=Q")
-"""Length of a message, which stands before it."""
+"""Length of a message, which precedes it."""
 _LAST_WORD_S: Final = 1.0
 """Time that a child has to end after it has closed its connection [s]."""
 _PIECE_BYTES: Final = 1 << 20

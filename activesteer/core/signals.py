@@ -296,7 +296,7 @@ class Motion(NamedTuple):
 class Estimate(NamedTuple):
     """Motion of the centre of gravity over the road, as estimated from the sensors.
 
-    A standard deviation is that of the error which the estimator itself expects.
+    A standard deviation describes the error that the estimator itself expects.
 
     Attributes:
         speed_mps: Speed along the car's longitudinal axis [m/s].

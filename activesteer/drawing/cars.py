@@ -1,6 +1,6 @@
 """Outlines and bodies of cars for drawings.
 
-They are added when something is drawn: no model and no recording contains them. `tools/make_bodies.py` makes the
+They are added when something is drawn: no model and no recording contains them. `tools/make_bodies.py` creates the
 surfaces.
 """
 

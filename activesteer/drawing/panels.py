@@ -20,7 +20,7 @@ _OF_CORNERS: Final[dict[str, str]] = dict(zip(CORNERS, ("#56b4e9", "#e69f00", "#
 CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 _GREY: Final = "#a6a6a6"
 PATH_DISTANCE: Final = "path_distance_m"
-"""The only line that is not derived from recorded channels alone: views that know the course derive it."""
+"""The only line that needs more than recorded channels: views that know the course derive it."""
 AXLE_SLIP: Final = {f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l", f"{axle[0]}r") for axle in ("front", "rear")}
 """Slip angle of an axle -> its wheels. It is their mean by wheel load, so that a lifted wheel has no part."""
 _LEAST_LOAD_N: Final = 1.0

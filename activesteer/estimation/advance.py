@@ -1,16 +1,16 @@
 """Compiled step of the estimator: update the filters with new samples, and compute the estimate.
 
 The inertial sensors are late by their delay and low-pass. The filters run at the time of the measurement: a buffer
-holds angles, wheel speeds and pressures until then. From there the model alone runs to the present, with the later
+holds angles, wheel speeds and pressures until then. From there only the model runs to the current time, with the later
 angles.
 
-Two things show the friction where the lateral forces alone do not. Errors that the filter does not explain add up until
-the friction is made unknown again (a cumulative sum). And while the brakes slide wheels of both sides, the car uses
-nearly all of its friction.
+Two things show the friction where the lateral forces do not. Errors that the filter does not explain add up until the
+friction is made unknown again (a cumulative sum). And while the brakes slide wheels of both sides, the car uses nearly
+all of its friction.
 
 Sources:
     Page, Continuous inspection schemes, Biometrika 41, 1954 (cumulative sum).
-    Gustafsson, Slip-based tire-road friction estimation, Automatica 33, 1997 (such a test beside a Kalman filter).
+    Gustafsson, Slip-based tire-road friction estimation, Automatica 33, 1997 (such a test next to a Kalman filter).
 
 Arguments of the compiled functions of this folder:
 
@@ -61,7 +61,7 @@ _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
 _EXPLAINED: Final = 1.5
 _UNEXPLAINED: Final = 6.0
-"""The squared errors over their covariances, less the first number, are summed up, and the sum is never below 0. Above
+"""The squared errors over their covariances, minus the first number, are summed up, and the sum is never below 0. Above
 the second number the car has met another road. In ordinary runs these errors are 0.3 to 0.9 on average, since the
 covariances include errors that last; where wheels reach snow they are 2 to 5 for 0.1 s. Of 6, 10 and 16, chosen by the
 share of the samples with the true friction inside two deviations, on 112 recordings (comparison, seed 9)."""

@@ -57,7 +57,7 @@ MEMORY: Final = np.dtype(
 
 The estimate and the number of calls. The last step of the filters: time since then, squared error of both measurements
 and of the yaw rate over their expected covariances, sum of what is unexplained in them, wheels left out, smoothed and
-largest use of the friction, last samples. States and covariances of the filters, and the present state. Inputs of the
+largest use of the friction, last samples. States and covariances of the filters, and the current state. Inputs of the
 model: steer angles, longitudinal acceleration, longitudinal force of the front axle, moment of all longitudinal forces,
 lateral acceleration that loads the wheels, roll; and for each wheel its
 longitudinal force, its load, the speed of the car by this wheel, and the time since it slid.

@@ -53,7 +53,7 @@ _MANEUVER: Final = {
     "cones.offset_m": (0.5, 4.0, 0.05),
     "brake.pedal": (0.0, 1.0, 0.01),
 }
-"""Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges are those of passenger cars."""
+"""Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges suit passenger cars."""
 _CAR: Final = {
     "factors.mass": (0.8, 1.4, 0.01),
     "factors.yaw_inertia": (0.7, 1.4, 0.01),
@@ -321,7 +321,7 @@ class Runs:
     def _held(self, choice: RunRequest, overrides: dict[str, float]) -> tuple[Scenario, dict[str, float], str, str]:
         """Return a scenario with its amplitude, its overrides, words for its title, and a note for the reader.
 
-        While a slider moves, the amplitude is that of the last search, else a new one. If a new search fails, the
+        While a slider moves, the amplitude comes from the last search, else from a new one. If a new search fails, the
         amplitude stays, and becomes an override.
         """
         scenario, key = self._resolved(choice, overrides), (choice.maneuver, choice.vehicle)

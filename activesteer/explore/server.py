@@ -1,7 +1,7 @@
 """The server of the page: files of the page, and a WebSocket between the browser and the worker process.
 
-It listens only on 127.0.0.1. The address of the page contains a random token, and the headers Host and Origin must be
-those of this server, so that neither another user's browser nor another page in yours can reach it.
+It listens only on 127.0.0.1. The address of the page contains a random token, and the headers Host and Origin must name
+this server, so that neither another user's browser nor another page in yours can reach it.
 """
 
 from __future__ import annotations

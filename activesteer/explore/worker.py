@@ -1,7 +1,7 @@
 """The worker process of the page: one thread that drives, controlled by messages through a pipe.
 
-A new choice drops the runs of an older one. Any error, also one of own code, becomes a message to the page; the process
-goes on.
+A new choice drops the runs of an older one. Any error, also in a user's code, becomes a message to the page, and the
+process continues.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The file `validation.toml` of a folder of measured runs, and example folders.
 
-The file stands in the folder of the measured files. Windows are times of these files.
+The file is in the folder of the measured files. Windows are times of these files.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class MeasurementMap:
     time_unit: str = ""
     """Unit of the time; by default the unit of the file, or s."""
     shift_s: dict[str, float] = field(default_factory=dict)
-    """File -> time to add to its clock, if several files have clocks of their own [s]."""
+    """File -> time to add to its clock, if several files have separate clocks [s]."""
     step_s: Annotated[float, Range(1e-4, 1.0)] | None = None
     """Step of the recording; by default the step of the file."""
     max_gap_s: Annotated[float, Range(0.0)] = 0.1
@@ -226,7 +226,7 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
 
 
 def _shared_times(files: _Files, chosen: MeasurementMap, lacking: list[Path]) -> dict[Path, Array]:
-    """Return the common times of the columns of each file, for columns without times of their own [s]."""
+    """Return the common times of the columns of each file, for columns without separate times [s]."""
     if chosen.time and not lacking:
         raise RecordingError("every column has its own time; leave this key out", key="time", value=chosen.time)
     named = [path for path in lacking if any(column.name == chosen.time for column in files[path])]

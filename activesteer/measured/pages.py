@@ -29,7 +29,7 @@ from activesteer.plotting import Area, Curve, Panel, Picture
 _EDGE: Final = "#9bbbd4"
 _START: Final = "#888888"
 _WIDE: Final = 3.2
-"""Width of a simulated curve, beside which a measured one that coincides with it can be seen [pt]."""
+"""Width of a simulated curve, at which a measured curve that coincides with it remains visible [pt]."""
 _SAME_TIME_S: Final = 0.05e-3
 """Shifts below it are 0.0 ms."""
 

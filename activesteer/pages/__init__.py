@@ -1,6 +1,6 @@
 """Self-contained HTML pages, from one jinja2 template and one stylesheet.
 
-In: tables, pictures and texts.
+In: tables, figures and texts.
 Out: HTML pages that work without a network.
 """
 

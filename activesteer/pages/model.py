@@ -186,9 +186,9 @@ class Section(NamedTuple):
     Attributes:
         title: Its heading; empty for none.
         texts: Paragraphs.
-        tables: Tables. They stand before the pictures: a reader wants the verdict first.
+        tables: Tables. They precede the figures, because a reader wants the verdict first.
         points: Items of a list.
-        pictures: Pictures, whose panels the page draws.
+        pictures: Figures, whose panels the page draws.
         level: Level of its heading: 2, or 3 for a part of the section before.
         kind: Class of the list in the stylesheet, or "repeated" for pictures of a table's values, folded on a phone.
         anchor: Name by which links and the page's own script find the section, which ends with what the script draws.

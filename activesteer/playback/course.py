@@ -24,7 +24,7 @@ _BESIDE_M: Final = 15.0
 _BEYOND_M: Final = 60.0
 """Margins of the grid and the friction patches around cars and course [m]."""
 _HORIZON_M: Final = 2000.0
-"""Length of road beyond the grid [m]: its edge must not be seen to move in the picture of a chase camera."""
+"""Length of road beyond the grid [m]: its edge must not visibly move in the frame of a chase camera."""
 _MAP_MARGIN_M: Final = 8.0
 _TILE_M: Final = 10.0
 

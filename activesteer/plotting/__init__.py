@@ -1,7 +1,7 @@
 """Plots: a model of curves, panels and figures, drawn by matplotlib without a display.
 
 In: numbers with names and units.
-Out: figures as PNG, PDF or SVG, and models of pictures for pages.
+Out: figures as PNG, PDF or SVG, and models of figures for pages.
 """
 
 from activesteer.plotting.drawing import draw, new_figure, plain_axis, save, save_all

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 DOTS_PER_INCH: Final = 300
-"""Resolution of pictures that are saved as pixels: journals ask for it."""
+"""Resolution of figures that are saved as pixels, as journals require."""
 
 
 def new_figure(width_in: float, height_in: float, title: str = "") -> Figure:

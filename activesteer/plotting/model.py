@@ -25,7 +25,7 @@ class Curve(NamedTuple):
         width: Width of the line [pt].
         marker: Marker of its points, as matplotlib names it; empty for none.
         size: Size of the marker [pt].
-        shade: Place on the picture's colour scale, from 0 to 1; None for a colour of its own.
+        shade: Place on the figure's colour scale, from 0 to 1; None for a separate colour.
     """
 
     x: ArrayLike
@@ -130,7 +130,7 @@ class Picture(NamedTuple):
     """A figure: panels in rows and columns.
 
     Attributes:
-        title: Title of the picture.
+        title: Title of the figure.
         panels: The panels, row by row.
         scale: Meaning of the shades of curves: name, least and greatest value.
         columns: Number of panels next to each other; 0 for a number that fits.

@@ -100,8 +100,8 @@ class ClosedLoop(Uncopyable):
     """A manoeuvre, a driver, a controller and a car.
 
     Attributes:
-        scenario: Manoeuvre, car and driver, with the changes made on the way.
-        changes: Keys changed on the way and their values, and the times of the changes [s].
+        scenario: Manoeuvre, car and driver, with the changes made during the run.
+        changes: Keys changed during the run and their values, and the times of the changes [s].
         sequence: Phases of the manoeuvre in this run; None without phases.
         blocks: Driver and controller; a native one is behind its record while it is driven, see `driver`.
         unit: How the loop calls the controller.
@@ -110,7 +110,7 @@ class ClosedLoop(Uncopyable):
         driver_setup: Properties of the car that a driver may know.
         controller_setup: Properties of the car that a controller may know.
         settling: Setpoint while the car settles.
-        in_use: Context that refuses a second caller while the loop is driven.
+        in_use: Context that rejects a second caller while the loop is driven.
     """
 
     def __init__(
@@ -295,7 +295,7 @@ class ClosedLoop(Uncopyable):
 
         Args:
             faults: The faults.
-            more: Whether to keep the present faults, with their memory.
+            more: Whether to keep the current faults, with their memory.
 
         Raises:
             ManeuverError: a fault concerns a part that this car does not have, or that has a fault at this time.

@@ -24,13 +24,13 @@ from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.film import CUTAWAY
 
 FRAME_S: Final = 0.016
-"""Minimum time between two pictures [s]: a screen shows 60 per second."""
+"""Minimum time between two frames [s]: a screen shows 60 per second."""
 _MAX_S: Final = 0.1
-"""Maximum time between two pictures [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
+"""Maximum time between two frames [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
 instead of jerky."""
 _SLOWER: Final = (ord("-"), 333)
 _FASTER: Final = (ord("="), ord("+"), 334)
-"""Codes of minus and plus, also of those of the number pad."""
+"""Codes of minus and plus, also on the number pad."""
 _SLOWEST, _FASTEST = 0.01, 100.0
 _LONGEST_CLOSING_S: Final = 5.0
 _TURN_S: Final = 0.4
@@ -87,7 +87,7 @@ class Keys:
     Attributes:
         paused: Whether the drive stands still.
         restart: Whether the drive shall start anew.
-        faster: Factor of the speed, to apply before the next picture.
+        faster: Factor of the speed, to apply before the next frame.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
 """The loop: setpoint -> driver -> controller -> vehicle with faults, sensors and recorded row, once every step.
 
 Every run of every car passes through `drive_cars`: one car or many, with native and with Python blocks. It stops where
-Python has to act, says why, and goes on from there; see `closed_loop`.
+Python has to act, returns the reason, and continues from there; see `closed_loop`.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ CAR: Final = np.dtype(
 `step`, `left`: steps made and steps to make; `stage`, `status`: where it stands and why; `next_change`: step before
 which a fault begins or ends. `bindings`: `Vehicle.address`. `first`, `last`: steps of the first setpoint and behind the
 last one. `loaded`: whether driver and controller are in the record. `driver_given`, `controller_given`: whether the
-present command holds. `torques_Nm`: torques of the wheels if they are set. `law`, `block`: addresses of a native
+current command holds. `torques_Nm`: torques of the wheels if they are set. `law`, `block`: addresses of a native
 controller's law and block. `every`, `on_bus`: steps between two calls of the controller, and steps that its command
 takes to arrive; `calls`: steps that it has counted. `estimate`: address of the recorded estimate, or 0.
 `steering_ratio`: not 0 if the controller knows the driver's demand by the angle sensor only; `seen`: the driver's

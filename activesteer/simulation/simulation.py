@@ -85,7 +85,7 @@ class Simulation(Copyable):
         scenario: Manoeuvre, car and driver, as at the start.
         loop: The blocks: `loop.driver`, `loop.controller`, `loop.vehicle`, and the properties of the car they may know.
         context: Contents of the recording apart from its rows.
-        events: What was changed on the way; see `set` and `fail`.
+        events: Changes during the run; see `set` and `fail`.
 
     Examples:
         >>> import activesteer

@@ -1,7 +1,7 @@
 """Parameters of a tyre, their conventions, and a check that the forces are finite.
 
 A .tir file holds coefficients, not a program. The defaults are the conventions of this package. The alternatives are
-those of other codes, so that a car can be compared with one of theirs, force by force.
+the conventions of other codes, so that a car can be compared with a car of such a code, force by force.
 """
 
 from __future__ import annotations

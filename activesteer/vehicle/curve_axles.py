@@ -11,7 +11,7 @@ over z. Its slopes are the forces: Q_q = -dU/de, and by the chain rule Q_z = dU/
 lost or gained, whatever the curves.
 
 The engine is implicit in tendons only, so each corner has some tendons for the stiff part of K, with the slopes of the
-curves in the design position (`curve_axles`). The forces here are the difference: the forces above less those of
+curves in the design position (`curve_axles`). The forces here are the difference: the forces above minus the forces of
 these tendons.
 """
 
@@ -65,7 +65,7 @@ class AxleCurves:
     caster_rad: tuple[float, ...]
     """Rotation of the knuckle in side view, positive with the top to the rear, from the design position [rad]."""
     load_N: tuple[float, ...]
-    """Measured wheel load less the loads of spring, stops and anti-roll bar [N]."""
+    """Measured wheel load minus the loads of spring, stops and anti-roll bar [N]."""
     stiffness: tuple[float, ...]
     """Stiffness of the left wheel at its centre, against forces along x and y and moments about x, y and z: upper
     triangle of the symmetric 5 x 5 matrix, row by row [N/m, N, N m/rad]."""

@@ -194,7 +194,7 @@ BATTERY: Final = numbers_type("discharge_W", "charge_W", "auxiliary_W")
 """Limits of the battery."""
 
 MOTOR_STATE: Final = numbers_type("torque_Nm", "difference_Nm", "demand_Nm", "power_W", "limited")
-"""State of a motor: torque at its wheels together, torque of the right wheel less that of the left one (0 behind an
+"""State of a motor: total torque at its wheels, torque of the right wheel minus torque of the left wheel (0 behind an
 open differential), demand before limits, electric power, and whether a limit acts."""
 BATTERY_STATE: Final = numbers_type("power_W", "energy_J", "limited")
 """Power at the terminals, positive when the battery gives it, energy given since the start, and whether a limit acts.

@@ -212,7 +212,7 @@ path where there is one. Where areas overlap, the later one counts. Areas count 
 which `Vehicle.rebase` sets, since the road has no origin before."""
 
 PATH_GRID: Final = numbers_type("x0_m", "y0_m", "cell_m", "columns", "rows", "spacing_m")
-"""Head of the grid of the path that the friction follows (`PathGrid`). Points and cells have sections of their own."""
+"""Head of the grid of the path that the friction follows (`PathGrid`). Points and cells have separate sections."""
 
 LINK: Final = numbers_type(
     "tendon", "rest_m", "stiffness_Npm", "backlash_m", "act", "screw_act", "sign", "userdata",

@@ -28,9 +28,9 @@ All features of MuJoCo 4.0's models, and who computes a step that has them. "Eng
 The engine finds the accelerations of a step from (M + h D + h^2 K) a = f - h K v: M is the mass matrix, D and K are
 damping and stiffness of tendons, servos and joints (integrator `discrete`). It factorises M along the tree of joints
 and finds the rest by conjugate gradients, which suits any model. In a car the springs join hardly more degrees of
-freedom than M already does. Eliminated in the right order, the whole matrix is factorised exactly for the price of M
-alone. The order and the pattern of the matrix follow from the model and are found once (minimum degree: Tinney and
-Walker 1967).
+freedom than M already does. With the right order of elimination, factorising the whole matrix exactly costs no more
+than factorising M. The order and the pattern of the matrix follow from the model and are found once (minimum degree:
+Tinney and Walker 1967).
 
 The direct solution is what the engine's iteration converges to. From the same state, both give the same accelerations
 within 1e-14 of the largest one (tolerance of the engine 1e-14). Over many steps the difference grows to that of two

@@ -47,7 +47,7 @@ class LocalState:
     the tyres).
 
     It leaves out the position on the road, the heading, the rotation angles of the wheels, and the wind-up of parts
-    that hold or slip. The brake pads of a rolling wheel slip and have no motion of their own; for the rack see
+    that hold or slip. The brake pads of a rolling wheel slip and have no separate motion; for the rack see
     `linearisation`. The friction of damper seals, if any, is included, because excitation by the road makes it smooth.
 
     Attributes:
@@ -172,7 +172,7 @@ _MIN_LIKENESS: Final = 0.9
 class Mode:
     """One mode: a real pole or a conjugate pair.
 
-    Its name is that of the part that takes part most. The eigenvalue has no negative imaginary part; the participation
+    It is named after the part that participates most. The eigenvalue has no negative imaginary part; the participation
     factors have the sum 1, largest first. `shape` and `left` are right and left eigenvector, whose product is 1.
     """
 

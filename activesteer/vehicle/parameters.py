@@ -130,7 +130,7 @@ class Powertrain:
     max_torque_Nm: Positive
     """Highest drive torque at all wheels together, in first gear [N m]."""
     max_power_W: Positive
-    """Highest power at all wheels together: the engine's less the losses of the gears [W]."""
+    """Highest total power at the wheels: the power of the engine minus the losses of the gears [W]."""
     engine_brake_torque_Nm: NotNegative
     """Drag of the engine at all wheels together, in first gear [N m]; less in the longer gears of higher speeds."""
     max_wheel_speed_radps: Positive = 250.0

@@ -28,7 +28,7 @@ def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.int
     """Move the car into static equilibrium, by Newton's method on the forces at rest.
 
     The car must stand near the equilibrium. Velocities and activations are set to zero: the tyres carry their load, and
-    no lateral force except that of their own asymmetry.
+    no lateral force except from their own asymmetry.
     """
     free = np.setdiff1d(np.arange(model.nv), held)
     data.qvel[:] = 0.0

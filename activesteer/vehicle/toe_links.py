@@ -164,7 +164,7 @@ CORNERS: Final = ("rl", "rr")
 LINKS: Final = ("toe_link", "tie_rod")
 """Names of a rear toe link after its corner."""
 SCREW: Final = "_screw"
-"""Suffix of the state beside an actuator that is its screw's position: one per side, or `rear_screw` in the middle."""
+"""Suffix of the state next to an actuator that is its screw's position: one per side, or `rear_screw` in the middle."""
 
 
 def fit_screws(spec: mujoco.MjSpec, actuator: RearActuator) -> None:

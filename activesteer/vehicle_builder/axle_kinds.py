@@ -3,9 +3,8 @@
 A massless arm that turns about its inner bushings carries a force f at P as a force r f at its outer joint O, with r =
 |PH| / |OH|. H is the point where the line through O and P meets the axis of the arm; the chassis carries the rest of f.
 The tendon therefore ends at O, begins at a point 1/r times as far from O as the upper spring end from P, and runs
-through a pulley of 1/r. By similar triangles it has the length of the spring in every position of the arm. A foot P
-beside the plane of the arm has the right length and motion ratio at the design position, but does not turn with the
-arm.
+through a pulley of 1/r. By similar triangles it has the length of the spring in every position of the arm. A foot P off
+the plane of the arm has the right length and motion ratio at the design position, but does not turn with the arm.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ iterations."""
 _UNITS: Final = np.sqrt(np.outer(np.diag(_USUAL), np.diag(_USUAL)))
 _LOWER: Final = np.tril_indices(5)
 _LINEAR: Final = 15
-"""Number of entries of a triangle, before those of the hardening springs."""
+"""Number of entries of a triangle, before the entries of the hardening springs."""
 _SPRING: Final = 250.0 * np.array([1.0, 1.0, 0.3, 0.3, 0.3])
 """Unit of the hardening springs: 4e9 N/m3 along the car."""
 _FIRST_SPRINGS: Final = np.array([1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, -0.5, 0.0, 0.0, 0.0])

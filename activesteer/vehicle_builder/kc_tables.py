@@ -1,8 +1,8 @@
 """Reader of a laboratory's K&C tables, which become samples of the left wheel.
 
 Each file is AXLE_TEST.csv, or AXLE_TEST.toml with the columns as lists (`rigs.kc.result.TESTS` names the tests). The
-samples of the right wheel are mirrored and added to those of the left wheel. Both branches of a loop are kept, and the
-fitted curve averages them. `names.toml` gives the channel names of a laboratory and the signs that differ:
+samples of the right wheel are mirrored and added to the samples of the left wheel. Both branches of a loop are kept,
+and the fitted curve averages them. `names.toml` gives the channel names of a laboratory and the signs that differ:
 
     [names]
     "Toe_FL_deg" = "left_toe [deg]"

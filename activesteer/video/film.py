@@ -34,8 +34,8 @@ CUTAWAY: Final = 0.12
 _SHELL_OPACITY: Final = {"chase": 1.0, "top": 0.25, "wheel": CUTAWAY}
 """Camera -> opacity of the shell of a car."""
 _NEAR_M, _MOST_ASIDE_M, _BACK_PER_ASIDE = 1.5, 25.0, 2.2
-"""Half distance of cars up to which the camera stays with the first one [m], most that its target moves beside that
-car [m], and way of the camera backwards for each metre of it."""
+"""Half distance of cars up to which the camera stays with the first one [m], largest distance that its target moves
+away from that car [m], and distance that the camera moves back for each metre of it."""
 _SIDE_LIMIT: Final = 8192
 """Most pixels of a side of a film."""
 

@@ -32,7 +32,7 @@ _TRY_TIMEOUT_S: Final = 60.0
 def backend() -> str:
     """Return the backend of MUJOCO_GL, or the first backend that works.
 
-    Each backend is tried in a process of its own: a broken driver may end the process, and PyOpenGL cannot change its
+    Each backend is tried in a separate process: a broken driver may end the process, and PyOpenGL cannot change its
     backend once it has loaded one.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower()

@@ -1,8 +1,8 @@
 """The paper's figures from recordings, with the paper's curve numbers 1, 2 and 3.
 
-`draw_all` makes the figures of whole reproductions, `figure_for` makes one figure of a manoeuvre. matplotlib is an
-extra of the package and imported when a picture is made. Figures 1, 2 and 3 need more than recordings and are made
-elsewhere.
+`draw_all` draws the figures of complete reproductions, and `figure_for` returns the function for one figure of a
+manoeuvre. matplotlib is an extra of the package, imported only when a figure is drawn. Figures 1, 2 and 3 need more
+than recordings and are drawn elsewhere.
 
 In: recordings.
 Out: figures in the style of the paper.

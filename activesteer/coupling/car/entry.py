@@ -1,6 +1,6 @@
 """C functions of an exported car: its step, the computed channels, and the faults of actuators.
 
-They contain the kernels of a simulation; the C code around them holds no law of its own.
+They contain the kernels of a simulation; the C code around them contains no laws.
 """
 
 from __future__ import annotations

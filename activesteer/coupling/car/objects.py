@@ -1,7 +1,7 @@
 """Compiled objects of an exported car: compilation and relocation.
 
 The code comes from the same kernels as the code of a simulation, so both are bit-identical.
-numba keeps the compiled module in an interface of its own (`_library`), which may change with a new version.
+numba keeps the compiled module in a private interface (`_library`), which may change with a new version.
 
 The native step finds everything by addresses in its records. Here each address becomes a `Relocation`: the place of the
 word, and what it points to. A word that looks like an address but points to nothing known is an error, so that a new

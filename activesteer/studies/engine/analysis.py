@@ -2,7 +2,7 @@
 
 A Saltelli design gives first-order and total indices (Saltelli et al. 2010), a Morris design mean and spread of
 elementary effects (Campolongo et al. 2007), and any other sample the first-order indices by RBD-FAST (Tarantola et al.
-2006), which needs no design of its own.
+2006), which needs no special design.
 """
 
 from __future__ import annotations

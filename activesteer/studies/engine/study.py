@@ -56,8 +56,8 @@ def study(
     Args:
         study_file: Name or path of a study file, its table, or a study that was read before.
         output: Folder of the study; an existing study is resumed. Without a folder, nothing is stored.
-        jobs: Number of processes; default: the number of processors. With 1, this process makes all runs.
-        client: A `distributed.Client` whose cluster makes the runs.
+        jobs: Number of processes; default: the number of processors. With 1, this process drives all runs.
+        client: A `distributed.Client` whose cluster drives the runs.
         scheduler: Address of a Dask scheduler, or its scheduler file, instead.
         workers: Workers shared by several studies, instead.
         limit: Largest number of runs to make now.

@@ -38,7 +38,7 @@ from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_
 from activesteer.theory.single_track import SingleTrack
 
 STEP_M: Final = 0.5
-"""Offset of the path beside the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
+"""Offset of the path from the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
 moves the steering wheel further than the friction of the rack can hide."""
 _CLOSE_M: Final = 0.1 * STEP_M
 """Distance from the path that may remain at the end [m]; the friction of the rack hides some."""

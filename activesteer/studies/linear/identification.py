@@ -1,7 +1,7 @@
 """Identification of a car by driving it: steady-state handling (ISO 4138) and the matching single-track model.
 
-The tests are slowly increasing steer at 80 and 100 km/h and a circle of 100 m. Mass, yaw inertia and axle distances are
-those of the model at static ride. Axle stiffnesses and characteristic speed come from the two tests at constant speed,
+The tests are slowly increasing steer at 80 and 100 km/h and a circle of 100 m. Mass, yaw inertia and axle distances
+come from the model at static ride. Axle stiffnesses and characteristic speed come from the two tests at constant speed,
 from 0.5 to 2 m/s2. They are effective values for the driver's angle (steering wheel angle over overall ratio), so they
 contain roll steer, compliance and the column.
 """

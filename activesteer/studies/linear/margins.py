@@ -64,7 +64,8 @@ from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
-"""Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond those of its suspensions."""
+"""Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond the natural frequencies of its
+suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
 ASKED_DISK: Final = 0.5
@@ -438,8 +439,8 @@ def worst_margins(
     """Return the smallest margins of every loop at every speed over the cars of a study.
 
     Factors for single manoeuvres are left out; manoeuvres, cars and controllers of the study have no effect. Overrides
-    may not set a key that the study varies. With more than one process, controllers must be picklable. `factors` are
-    those of the smallest disk margin; each margin is the smallest over all samples.
+    may not set a key that the study varies. With more than one process, controllers must be picklable. `factors` belong
+    to the smallest disk margin; each margin is the smallest over all samples.
     """
     given, changed = read_study(study_file), dict(overrides or {})
     for key in changed:

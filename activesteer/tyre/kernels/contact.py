@@ -18,7 +18,7 @@ Three additions make the states usable from standstill to any speed:
   Nothing gets stiff when sigma becomes small, and at rest the tyre is a spring, not an amplifier.
 * At low speed, a contact patch that slides as a whole limits the deflection (the "wind-up" of Pacejka, eq. 8.125 ff.).
   |V_x| is replaced by max(|V_x|, |V_s| / slip_limit), at rest with one |V_s| / slip_limit for both axes, so that a
-  sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit is that of the tyre file, separately for
+  sliding tyre pulls against its sliding. Above `low_speed_mps` the slip limit comes from the tyre file, separately for
   each axis, so that the formula's steady state is reached exactly within its range of validity.
 * At low speed a viscous term acts in addition to the spring (Pacejka, eq. 8.129: k_Vlow) and fades out with a cosine.
   It enters as a slip, so that the friction limit bounds it.

@@ -1,7 +1,7 @@
 """Compiled formulas of slip forces, combined slip, turn slip and relaxation lengths.
 
-Symbols are those of the source: p (record of the tyre), z0 ... z4 (turn slip factors zeta), lmu (friction scale with
-the road's), `_s` for the starred angles, K stiffness, S_H and S_V shifts.
+The symbols follow the source: p (record of the tyre), z0 ... z4 (turn slip factors zeta), lmu (friction scale with the
+road's), `_s` for the starred angles, K stiffness, S_H and S_V shifts.
 
 Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, equations 4.E9 to 4.E30;
 for MF 5.2: 2nd ed. 2006, section 4.3.2.

@@ -65,7 +65,7 @@ def vertical_force_loaded(
 
     Args:
         p: Record of the tyre.
-        deflection_m: Free radius of the rotating tyre less the loaded one [m]; zero or less gives no force.
+        deflection_m: Free radius minus loaded radius of the rotating tyre [m]; zero or less gives no force.
         omega_radps: Rotational speed [rad/s].
         pressure_Pa: Inflation pressure [Pa].
         fx_N: Longitudinal force [N].
@@ -110,7 +110,7 @@ def bottoming_force(p, deflection_m: float, omega_radps: float) -> float:
 
     Args:
         p: Record of the tyre.
-        deflection_m: Free radius of the rotating tyre less the loaded one [m].
+        deflection_m: Free radius minus loaded radius of the rotating tyre [m].
         omega_radps: Rotational speed [rad/s].
     """
     room = free_radius(p, omega_radps) - p.RIM_RADIUS - p.BOTTOM_OFFST
@@ -123,7 +123,7 @@ def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: floa
 
     Args:
         p: Record of the tyre.
-        deflection_m: Free radius of the rotating tyre less the loaded one [m]; zero or less gives no force.
+        deflection_m: Free radius minus loaded radius of the rotating tyre [m]; zero or less gives no force.
         omega_radps: Rotational speed [rad/s].
         pressure_Pa: Inflation pressure [Pa].
     """
@@ -165,7 +165,7 @@ def contact_patch(p, fz_N: float, pressure_Pa: float):
     """Return length and width of the contact patch [m] (equations 9 and 10).
 
     Without Q_RA or Q_RB in the file (MF 5.2), the length follows from the vertical stiffness by the estimate of the
-    MF-Tyre 5.2 manual, and the width is that of the tyre.
+    MF-Tyre 5.2 manual, and the width is the width of the tyre.
     """
     fz = max(fz_N, 0.0)
     r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN

@@ -105,8 +105,8 @@ def follow_car(setup, state, ax_mps2, braked):
 def traction(setup, state, torque_Nm, braked):
     """Make the decisions of traction control: engine limit, motor torques and brake pressures.
 
-    The mean speed of the driven wheels may exceed that of the car by a fraction and a constant. A proportional and an
-    integral part reduce the drive torque by the excess; the integral starts from the torque at that time. Of two
+    The mean speed of the driven wheels may exceed the speed of the car by a fraction and a constant. A proportional and
+    an integral part reduce the drive torque by the excess; the integral starts from the torque at that time. Of two
     wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
     """
     turning, other = 0.0, 0.0
