@@ -1,8 +1,8 @@
 """Contributions to the steering wheel angle of the Tesla Model S on its measured circle.
 
 python tools/tesla_circle.py prints where the predicted angle comes from: the steps from geometry to the second
-prediction, the second prediction without one effect, and with one open decision reversed. docs/validation.md shows the
-numbers. `changed` also gives the values of the car in models/reference/tesla_model_s/validation.toml.
+prediction, the second prediction without one effect, and with one open decision reversed. docs/measured_cars.md shows
+the numbers. `changed` also gives the values of the car in models/reference/tesla_model_s/validation.toml.
 """
 
 from __future__ import annotations

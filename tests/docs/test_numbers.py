@@ -62,8 +62,8 @@ def test_claims_are_counted_in_words_as_in_the_table() -> None:
 
 
 def test_the_measured_circle_has_the_same_numbers_on_all_pages() -> None:
-    text = guide("validation.md")
-    about = cells(text, "`tesla_model_s`")[-1]
+    text = guide("measured_cars.md")
+    about = cells(guide("validation.md"), "`tesla_model_s`")[-1]
     for head in ("measured", "predicted, measured K&C only"):
         angle_deg = cells(text, f"{head} |")[0].partition(" ")[0]
         assert f"{angle_deg} deg" in about

@@ -165,7 +165,7 @@ def test_the_fitted_m8_predicts_the_second_lane_change_better_than_the_first_gue
     path.write_text(text[: text.index("[intervals]")], encoding="utf-8")
     result = validate_measured(read_measured(folder), 1)
     checked = {(one.stage, one.compared.channel): one.compared for one in result.parts if one.part == "check"}
-    # As written in docs/measured.md.
+    # As written in docs/measured_cars.md.
     assert checked["predicted", "yaw_rate_radps"].share_inside == pytest.approx(0.96, abs=0.02)
     assert not checked["predicted", "roll_rad"].inside
     assert checked["fitted", "yaw_rate_radps"].inside
