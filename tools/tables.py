@@ -210,10 +210,10 @@ def estimation_page(text: str) -> str:
 KEYS_PAGE: Final = Path(__file__).resolve().parent.parent / "docs" / "manoeuvre_keys.md"
 _KEYS_HEAD: Final = """# Keys of a manoeuvre file
 
-All keys that a manoeuvre's TOML file may have, by `kind`; `--set KEY=VALUE` and `overrides` take the same. A key may be
-written in any of the units named; defaults and ranges are in the first one. `needed` inside a table is needed where
-that table is given; `N` is the number of an entry, from 0. `tools/renew.py keys` writes this page from the classes
-that read the files.
+This page lists all keys that a manoeuvre's TOML file may have, by `kind`. `--set KEY=VALUE` and `overrides` take the
+same keys. You may give a key in any of the listed units; defaults and ranges are in the first unit. `needed` inside a
+table means that the key is needed if the table is given. `N` is the number of an entry, from 0. `tools/renew.py keys`
+writes this page from the classes that read the files.
 """
 
 
