@@ -93,7 +93,7 @@ def frequency_response_metrics(recording: RecordingLike) -> dict[str, float]:
         does not reach them. `coherence_min` is the least coherence of the three outputs up to 2 Hz.
 
     Raises:
-        RecordingError: a channel is missing, or the run is no sweep over this range.
+        RecordingError: a channel is missing, or the run is not a sweep over this range.
     """
     frequencies = np.geomspace(LOWEST_Hz, HIGHEST_Hz, 80)
     values: dict[str, float] = {}

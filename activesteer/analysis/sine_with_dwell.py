@@ -132,7 +132,7 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         A value is nan if the run ends before it.
 
     Raises:
-        RecordingError: a channel is missing, or the run holds no sine with dwell.
+        RecordingError: a channel is missing, or the run contains no sine with dwell.
     """
     times = steering(recording)
     time_s = recording.time_s

@@ -41,8 +41,8 @@ class CarEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     the path to the left of the line straight ahead after 0.3, 0.6, 1.0 and 1.5 s [m] +-100. `normalised` scales them to
     -1 to 1.
 
-    The reward and the reasons of an end follow `Episodes`; `info` has `reward_terms`, `sideslip_rad` and `end`,
-    after a reset the number of the `car` that was drawn.
+    The reward and the reasons for an end follow `Episodes`; `info` has `reward_terms`, `sideslip_rad` and `end`, after
+    a reset the number of the `car` that was drawn.
 
     Attributes:
         episodes: The simulation.

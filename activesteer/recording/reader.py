@@ -174,7 +174,7 @@ _END_OF_TIME_NS: Final = 2**35 * 10**9
 def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
     """Read a file written by `McapWriter`.
 
-    Return the arguments of `Recording`, and the description of a damage.
+    Return the arguments of `Recording`, and a description of the damage.
 
     A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
     before the damage. The values of a long recording are its rows, still in the file; its poses are then None.

@@ -117,7 +117,8 @@ class Recording:
             recover: Whether to return the part of a damaged file before the damage.
 
         Raises:
-            RecordingError: the file cannot be opened, is no recording, or is damaged; the message says what is left.
+            RecordingError: the file cannot be opened, is not a recording, or is damaged; the message gives the readable
+            part.
         """
         contents, damage = read_mcap(Path(path))
         if damage and not recover:

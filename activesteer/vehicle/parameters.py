@@ -49,7 +49,7 @@ _MASS_HINTS: Final = {
     **dict.fromkeys(("load_kg", "payload", "passengers", "luggage_kg"), _MASS_HINT),
     **dict.fromkeys(("cg_m", "cg_height", "cg_height_m"), _GRAVITY_HINT),
 }
-"""Keys that users look for in vain -> the keys that have the effect."""
+"""Keys that do not exist but that users may expect -> the keys that have this effect."""
 Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 
