@@ -59,7 +59,7 @@ class Esc:
 
 
 def beyond(value: float, band: float) -> float:
-    """Return the excess of a value beyond a dead band about 0."""
+    """Return by how much a value exceeds a dead band around 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 
 

@@ -217,7 +217,7 @@ def follow(human, setpoint, line, measured, motion, engine_radps, low_Nm, high_N
 
 
 _MAX_ANGLE_RAD: Final = 50.0
-"""Largest angle of a command. A larger one is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command. A larger one is treated as a mistake, such as degrees [rad]."""
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 _GEARS: Final = (-1, 0, 1)
 _MAX_TORQUE_NM: Final = 1e6
@@ -226,7 +226,7 @@ _MAX_TORQUE_NM: Final = 1e6
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Kind of block for drivers. A command is completed by the angle at the road wheel."""
+    """Block kind of drivers, which adds the angle at the road wheel to each command."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """Return a command with the angle at the road wheel (see the base class)."""

@@ -231,7 +231,7 @@ class ConstantRadiusDriver(NativeBlock):
         self._correction_1pm = 0.0
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command of a driver, with the steering wheel angle of a setpoint without a curvature."""
+        """Return the command (see `Driver`). A setpoint without a curvature gives the steering wheel angle instead."""
         curvature = setpoint.curvature_demand_1pm
         if curvature is None:
             return self.robot.step(setpoint, measurement, motion)

@@ -21,7 +21,7 @@ lateral acceleration is expected from its values at u and at sqrt(3) standard de
 
     slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
 
-A friction that jumps further than this range would be taken for soft tyres or for an offset of the accelerometer all
+A friction that jumps further than this range would be mistaken for soft tyres or for an offset of the accelerometer all
 the same. So a value with a surprising error says nothing about stiffness and offset, and `reopen` makes the friction
 unknown again (see `advance`).
 

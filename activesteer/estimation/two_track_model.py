@@ -78,7 +78,7 @@ _LONGEST_STEP_S: Final = 0.005
 
 @inlined
 def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
-    """Interpolate the lateral force of a tyre in its grid, at an angle from 0 on."""
+    """Interpolate the lateral force of a tyre in its grid, at a non-negative slip angle."""
     rows, columns = forces_N.shape
     across = min(angle_rad / angle_step_rad, columns - 1.000001)
     down = min(max(load_N / load_step_N, 0.0), rows - 1.000001)

@@ -211,7 +211,7 @@ class Fit(NamedTuple):
                 if each.channel in SensorOffsetTable.__dataclass_fields__:
                     advice += f", or make sensor_offset.{each.channel.replace('_rad', '_deg')} a factor"
                 found.append(
-                    f"the residual of the {where} is a constant offset: measured less simulated is {offset}; {advice}"
+                    f"the residual of the {where} is a constant offset: measured minus simulated is {offset}; {advice}"
                 )
             elif left > _MUCH:
                 found.append(

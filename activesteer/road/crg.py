@@ -186,7 +186,7 @@ def _columns(lines: list[str]) -> tuple[list[str], str]:
     """Return the names of the data columns in lower case, and the data format."""
     form = next((line[2:].strip().upper() for line in lines if line.startswith("#:")), "")
     if form not in (*_TEXT_CELLS, *_BINARY):
-        raise ManeuverError(f"the data format is {shown(form)}; known are {', '.join((*_TEXT_CELLS, *_BINARY))}")
+        raise ManeuverError(f"the data format is {shown(form)}; known: {', '.join((*_TEXT_CELLS, *_BINARY))}")
     names = [line[2:].partition(",")[0].strip().lower() for line in lines if line.startswith("D:")]
     limits.check_count(len(names), limits.MAX_CRG_COLUMNS, "data columns", ManeuverError)
     if not names:

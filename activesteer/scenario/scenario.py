@@ -344,7 +344,7 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
         if any(getattr(road, name) != getattr(before.road, name) for name in held) or road == before.road:
             raise _cannot(key, "only the friction of a road can" if road != before.road else "the value is the same")
         if len(road.areas()) != len(before.road.areas()):
-            raise _cannot(key, "the road has no such area; give it at the start, with the friction of the road")
+            raise _cannot(key, "the road has no such area; define it before the run, with the friction of the road")
         return "", replace(scenario, maneuver=_same_course(before, replace(before, road=road)))
     if path[0] in _FIXED:
         raise _cannot(key, "it belongs to the start of the run")

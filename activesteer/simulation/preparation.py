@@ -75,7 +75,7 @@ def recall(key: str) -> float | None:
 
 
 def keep(key: str, value: float) -> None:
-    """Store an amplitude in the process and, if allowed, on disk."""
+    """Store an amplitude in memory and, if allowed, on disk."""
     _remember(key, value)
     if not _writes:
         return
@@ -98,7 +98,7 @@ def keep(key: str, value: float) -> None:
 
 @contextlib.contextmanager
 def not_on_disk() -> Iterator[None]:
-    """Context that keeps new amplitudes only in the process, because the cars of a study do not recur."""
+    """Context that keeps new amplitudes only in memory, because the cars of a study do not recur."""
     global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
     before, _writes = _writes, False
     try:

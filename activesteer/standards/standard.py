@@ -159,7 +159,7 @@ class Findings:
 
     @property
     def passed(self) -> bool | None:
-        """True if the car keeps the limits, or None for a method without limits."""
+        """True if the car meets the limits, or None for a method without limits."""
         return self.values.get("pass")
 
 

@@ -98,7 +98,7 @@ def _motor_load(links, screw, act, ten_length):
 
 @inlined
 def _motor_limits(screw, speed):
-    """Return the limits of the torque by current, voltage and power at a speed [N m]."""
+    """Return the torque limits set by current, voltage and power at a speed [N m]."""
     high = min(screw.peak_Nm, max(screw.stall_Nm - screw.slope_Nmsprad * speed, 0.0))
     low = -min(screw.peak_Nm, max(screw.stall_Nm + screw.slope_Nmsprad * speed, 0.0))
     if speed > 0.0:

@@ -97,7 +97,7 @@ def read_table(study: StudyFile) -> TuneTable:
             if key not in factors:
                 raise source.fail(place, nearest_names(key, factors), key)
             if not _is_in(factors[key], value):
-                problem = f"{shown(value)} is outside of the factor; allowed are {shown(factors[key].extremes)}"
+                problem = f"{shown(value)} is outside the range of the factor; allowed: {shown(factors[key].extremes)}"
                 raise source.fail(place, problem, value)
     return table
 
