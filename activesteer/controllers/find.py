@@ -178,13 +178,13 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
 
     Args:
         given: See `controller_spec`.
-        setup: What the controller may know of the car.
+        setup: Properties of the car that the controller may know.
 
     Returns:
         The controller; a user's own is wrapped so that its errors name file and class.
 
     Raises:
-        ControllerError: there is no such controller, or it cannot be made.
+        ControllerError: there is no such controller, or it cannot be created.
     """
     return controller_spec(given).make(setup)
 

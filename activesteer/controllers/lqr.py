@@ -16,10 +16,10 @@ force:
 
     f* - M / (l C_V),  g* + M / (l C_H)
 
-In a steady turn, snow looks like dry road with soft tyres, and a car with soft front tyres turns less. Steered to the
-turn of new tyres, its rear axle could slide on snow. So as far as the friction is unknown, a car that understeers more
-by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle. Both axles then turn by
-the same angle, which leaves the yaw rate as it is.
+In a steady turn, snow looks like dry road with soft tyres, and a car with soft front tyres turns less. If it were
+steered to the turn of new tyres, its rear axle could slide on snow. Therefore, as far as the friction is unknown, a car
+that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle.
+Both axles then turn by the same angle, which leaves the yaw rate as it is.
 
 u* are the angles of the turn at the time when the current demand takes effect, a lag T_a and a call ahead. The law is
 
@@ -109,7 +109,7 @@ class Turn(NamedTuple):
         sideslip_rad: Steady-state sideslip angle [rad].
         steady_rad: Steady-state angles [rad].
         demand_rad: Angles that the state feedback demands, without limits [rad].
-        range_rad: Least and largest superposition angle that the driver and the yaw rate allow [rad].
+        range_rad: Smallest and largest superposition angle that the driver and the yaw rate allow [rad].
     """
 
     estimate: Estimate

@@ -1,9 +1,9 @@
 """Table of all metrics: display unit, smallest difference that counts, and preferred direction.
 
-A metric is declared here once. An evaluation that returns another name is an error; see `analysis.metrics`.
+A metric is declared here once. An evaluation that returns another name raises an error; see `analysis.metrics`.
 
-The significances rest on what is published about sensors and humans. The guide (`docs/claims.md`) says that the results
-of an earlier driver and earlier gains were known when these sizes were written down.
+The significances are based on published data about sensors and humans. The guide (`docs/claims.md`) says that the
+results of an earlier driver and earlier gains were known when these sizes were written down.
 """
 
 from __future__ import annotations

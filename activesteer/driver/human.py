@@ -55,7 +55,7 @@ class HumanDriver(NativeBlock):
         """Compute the gains on a path at a speed for compiled code, and return their number.
 
         Raises:
-            SimulationDiverged: the speed is beyond all reason.
+            SimulationDiverged: the speed is implausibly high.
         """
         rounded = round(speed_mps / SPEED_STEP_MPS)
         if not 0 <= rounded < N_SPEEDS:
@@ -111,7 +111,7 @@ _MAX_TABLES: Final = 64
 class SetpointTable(NamedTuple):
     """Setpoints of successive steps for compiled code.
 
-    The last one holds on.
+    The last setpoint is held.
 
     Attributes:
         rows: Records of `SETPOINT`.

@@ -373,7 +373,7 @@ class Slalom(AlongCourse, kind="slalom"):
 
     Between the cones the path is a cosine with its crests at the cones. It leaves the line of the cones one spacing
     before the first crest, with no more curvature than the cosine. Between the last two cones it straightens, with 15 %
-    more curvature. Behind the last cone it is straight and parallel to the row, so that the car oscillates there only
+    more curvature. After the last cone it is straight and parallel to the row, so that the car oscillates there only
     by itself. Both transitions are quintics without a jump of curvature.
     """
 

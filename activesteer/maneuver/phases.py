@@ -1,6 +1,6 @@
 """Phases: inputs that follow each other, at given times or when the car reaches a state.
 
-Each phase moves steering wheel, speed and pedals to its values and ends by its condition. So a manoeuvre can react to
+Each phase moves steering wheel, speed and pedals to its values and ends by its condition. A manoeuvre can thus react to
 the car: the fishhook steers back when the roll rate has died away.
 """
 

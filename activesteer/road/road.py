@@ -3,7 +3,7 @@
 A road is a plane with a grade and a bank, on which there may be an uneven surface (`surface`). Its friction may differ
 from place to place. Places are given in the world axes of the recording, x along the track from the initial position of
 the centre of gravity, y to the left; or, with `along = "path"`, by the distance along the path of the manoeuvre's
-course and the side of that path. For a wheel, the friction at its contact point counts. While the car settles before
+course and the side of that path. A wheel has the friction at its contact point. While the car settles before
 the recording, it rolls on the plane, only on `mu`.
 """
 

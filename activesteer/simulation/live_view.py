@@ -85,8 +85,8 @@ class Keys:
     """Keys of the window: space pauses, R restarts, minus and plus halve and double the speed.
 
     Attributes:
-        paused: Whether the drive stands still.
-        restart: Whether the drive shall start anew.
+        paused: Whether the drive is paused.
+        restart: Whether to restart the drive.
         faster: Factor of the speed, to apply before the next frame.
     """
 

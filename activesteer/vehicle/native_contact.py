@@ -1,6 +1,7 @@
 """Contact of a wheel with an uneven road, reduced to an effective plane.
 
-The tyre's formula needs a plane. Three ways lead to it, from the place straight below the lowest point of the wheel:
+The tyre's formula needs a plane. There are three ways to find it, from the point straight below the lowest point of the
+wheel:
 
 * `SINGLE_POINT`: tangent plane of the road at that place.
 * `FOUR_POINT`: plane through the middles of four points, `FOUR_POINT_AHEAD` of the free radius ahead and behind, and

@@ -1,7 +1,7 @@
 """Workers for tasks, with one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
-and repeated. A task that kills its worker every time is given up.
+and repeated. A task that kills its worker every time is abandoned.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 
     They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
     all decrements are alike; the friction of the rack makes those of small amplitudes smaller. The damping ratio is 1
-    if the car does not cross the path, also if it stops short of the path.
+    if the car does not cross the path, even if it stops short of the path.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 

@@ -1,6 +1,6 @@
 """Read and write .tir files.
 
-Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file ends in a `TyreFileError`
+Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file raises a `TyreFileError`
 that names the file, the line, the key, the value and the allowed range.
 """
 
