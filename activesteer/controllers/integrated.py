@@ -215,7 +215,7 @@ class Integrated:
         solution = self._solve(hessian, gradient, self._no_rows, *bounds).tolist()
         self._demand_rad = added, rear
         self._lqr.apply(added, rear)
-        # The anti-lock system lets a braked wheel slip more: the solver's last digits are no demand.
+        # The anti-lock system lets a braked wheel slip more: the solver's last digits are not a demand.
         fl, fr, rl, rr = (
             _KILO * force_kN * radius_m if force_kN > _LEAST_KN else 0.0
             for force_kN, radius_m in zip(solution[:_BRAKES], self._radii_m, strict=True)

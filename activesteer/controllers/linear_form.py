@@ -110,9 +110,9 @@ _PULSE: Final = {"yaw_rate_radps": 1e-4, "ay_mps2": 1e-3, "rear_steer_rad": 1e-5
 _SETTLE_S: Final = 2.0
 _LENGTH_S: Final = 8.0
 _LEFT: Final = 0.02
-"""Fraction of the largest answer that may remain at the end: an estimator learns the offset of a sensor slowly [-]."""
+"""Fraction of the largest response that may remain at the end: an estimator learns a sensor's offset slowly [-]."""
 _NONLINEARITY: Final = 0.01
-"""Tolerated error when half a pulse must give half the answer [-]."""
+"""Tolerated error when half a pulse must give half the response [-]."""
 
 
 def pulse_responses(

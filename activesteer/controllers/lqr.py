@@ -95,7 +95,7 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_
     ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std", "front_stiffness", "rear_stiffness"),
 )
 _SAME_RAD: Final = 1e-6
-"""Difference of an angle from its demand that is no limit [rad]."""
+"""Difference of an angle from its demand that does not count as a limit [rad]."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -127,7 +127,7 @@ class Lqr(NativeBlock):
     reads = ("lqr", "servos", "estimator")
     compiled_in = "activesteer.controllers.native_lqr"
     rates_radps = MappingProxyType({"rear": math.radians(25.0), "superposition": math.radians(25.0)})
-    """It removes 3 deg within the time in which the car answers, `removal_s`."""
+    """It removes 3 deg within the time in which the car responds, `removal_s`."""
     gains = LqrParameters
     derived = ("_schedule", "_superposition_works", "_rear_works")
     _estimator: Estimator

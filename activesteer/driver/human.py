@@ -156,7 +156,7 @@ class SharedTables:
                 del self._kept[next(iter(self._kept))]
             self._kept[key] = maneuver, from_step(first)  # with the manoeuvre, whose id then stays its own
         table = self._kept[key][1]
-        if step >= first + table.steps:  # the path changes on the way
+        if step >= first + table.steps:  # the path changes during the run
             return from_step(step), step
         return table, first
 

@@ -77,7 +77,7 @@ Kind = Literal["cosine_bump", "cleat", "kerb", "pothole", "cross_slope_ramp", "s
 SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
 """Name of a side -> its right and left border [m]."""
 FIRST_START_M: Final = 2.0
-"""Least distance of an obstacle from the start [m]: the front wheels stand some 1.3 m ahead of the origin."""
+"""Smallest distance of an obstacle from the start [m]: the front wheels are about 1.3 m ahead of the origin."""
 _LONG_M: Final = 1.5
 """Length from which a smooth obstacle hardly bends within the contact patch [m]: ten patches of 0.15 m."""
 

@@ -164,7 +164,7 @@ class Findings:
 
 
 _RATE_DEGPS: Final = 5.0
-"""Rate of the ramp [deg/s]. The car lags by some 0.1 s, which is half a degree."""
+"""Rate of the ramp [deg/s]. The car lags by about 0.1 s, which is half a degree."""
 _LONGEST_S: Final = 30.0
 
 

@@ -80,7 +80,7 @@ class TyreConventions:
 _MAX_FORCE: Final = 1e12
 """No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
 _ENORMOUS: Final = 1e7
-"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are some 1e6."""
+"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are about 1e6."""
 _TURN_SLIP_1PM: Final = 0.1
 _MF52: Final = 52.0
 

@@ -53,7 +53,7 @@ class Signals(NamedTuple):
     """Signals of messages, by name."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
-    others: frozenset[str]  # names of fields that are no numbers
+    others: frozenset[str]  # names of fields that are not numbers
     words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:

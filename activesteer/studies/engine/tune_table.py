@@ -46,9 +46,9 @@ class TuneTable:
     """The table [tune] of a study file."""
 
     minimise: dict[str, str] = field(default_factory=dict)
-    """Name -> expression that shall be small. For several, the Pareto front is found."""
+    """Name -> expression to be minimised. For several, the Pareto front is found."""
     satisfy: dict[str, str] = field(default_factory=dict)
-    """Name -> requirement. As many as possible shall hold."""
+    """Name -> requirement. The search satisfies as many as possible."""
     violate: str = ""
     """Requirement whose worst case is searched. `controller` stands for the examined controller."""
     constraints: dict[str, str] = field(default_factory=dict)
