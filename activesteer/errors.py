@@ -138,7 +138,7 @@ def nearest_names(name: str, known: Iterable[str], maximum: int = 5) -> str:
     listed = ", ".join(names) if names else "none"
     if len(listed) > MAX_SHOWN:
         listed = f"{', '.join(names[:maximum])} and {len(names) - maximum} more"
-    return f"known are: {listed}"
+    return f"known names: {listed}"
 
 
 _REPR: Final = reprlib.Repr()

@@ -94,8 +94,8 @@ def find_maneuver(name_or_path: str | os.PathLike[str]) -> Path:
     """Return the file of a manoeuvre.
 
     Args:
-        name_or_path: A name of the package, or the path of a .toml file. A text is a path if it contains a separator or
-            ends in `.toml`.
+        name_or_path: A name of the package, or the path of a .toml file. A string is a path if it contains a separator
+            or ends in `.toml`.
 
     Raises:
         ManeuverError: there is no such manoeuvre or file (another class for the other kinds); the message names similar
@@ -108,8 +108,8 @@ def find_vehicle(name_or_path: str | os.PathLike[str]) -> Path:
     """Return the parameter file of a vehicle.
 
     Args:
-        name_or_path: A name of the package, or the path of a .toml file or of its folder. A text is a path if it
-            contains a separator, ends in `.toml`, or is a folder and no name of the package.
+        name_or_path: A name of the package, or the path of a .toml file or of its folder. A string is a path if it
+            contains a separator, ends in `.toml`, or is a folder and not a name of the package.
 
     Raises:
         ParameterError: there is no such vehicle or file; the message names similar ones.

@@ -1,6 +1,6 @@
 """Train a rear-steering policy by augmented random search, and compare it with the package's controllers.
 
-    python examples/train_rear_steer.py train     some 3 minutes on two idle cores: policy.npz, learning_curve.png
+    python examples/train_rear_steer.py train     about 3 minutes on two idle cores: policy.npz, learning_curve.png
     python examples/train_rear_steer.py evaluate  the table of docs/learning.md, for the evaluation and the final set
     activesteer run sine_with_dwell -c "examples/train_rear_steer.py:Policy?weights=policy.npz"
 

@@ -105,7 +105,7 @@ def read_baseline(path: Path = BASELINE) -> dict[Run, dict[str, float]]:
             for controller, metrics in systems.items()
         }
     except (ValueError, TypeError, AttributeError) as error:
-        raise RecordingError("is no baseline of key metrics; renew it with --renew", file=str(path)) from error
+        raise RecordingError("is not a baseline of key metrics; renew it with --renew", file=str(path)) from error
 
 
 def write_baseline(metrics: Metrics, path: Path = BASELINE) -> Path:

@@ -41,7 +41,7 @@ Part = Callable[[Any], object]
 
 
 class Group:
-    """Group of commands in `--help`. Its call decorates the function of a command."""
+    """Group of commands in `--help`. Call it to decorate the function of a command."""
 
     def __init__(self, title: str) -> None:
         self.title = title

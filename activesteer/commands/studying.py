@@ -1,4 +1,4 @@
-"""Commands of many runs and of linear models: `study`, `tune`, `fit`, `identify`, `linearise`."""
+"""Commands for many runs and for linear models: `study`, `tune`, `fit`, `identify`, `linearise`."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _progress_of(folder: Path) -> dict[str, Any]:
 
 def _status(progress: dict[str, Any]) -> Iterator[str]:
     counts = ", ".join(f"{number} {status}" for status, number in progress["by_status"].items()) or "none"
-    at_work = "; a process is at work" if progress["running"] else ""
+    at_work = "; a process is working on it" if progress["running"] else ""
     yield f"{progress['done']} of {progress['total']} runs are done: {counts}{at_work}"
     yield from (f"{number:6}  {terminal.printable(error)}" for error, number in progress["errors"].items())
     yield from (f"without effect: {key} changes no metric of any run" for key in progress["without_effect"])
@@ -138,7 +138,7 @@ def _status(progress: dict[str, Any]) -> Iterator[str]:
         "a manoeuvre of the file; may be repeated (default: with the goal violate, all of the file)", many=True),
     arguments.one_of(
         arguments.option("--trials", "N", "total number of sets of each search (default: from the file)", type=int),
-        arguments.option("--runs", "N", "the same as a budget of runs, of which a set needs several", type=int),
+        arguments.option("--runs", "N", "the same limit as a number of runs; a set needs several runs", type=int),
     ),
     arguments.WORKERS, arguments.JSON,
     description="Search the ranges of the factors of a study for values that minimise objectives, satisfy as many "

@@ -429,7 +429,7 @@ def _elements(
     """Convert a list of numbers or of tables."""
     element = element_of(hint)
     if not isinstance(raw, (list, tuple)):
-        wanted = "no list of numbers" if element is None else f"no list; tables [[{'.'.join(path)}]] are needed"
+        wanted = "not a list of numbers" if element is None else f"not a list; tables [[{'.'.join(path)}]] are needed"
         raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
     if element is not None:
         return tuple(convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
@@ -444,7 +444,7 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
         words = typing.get_args(hint)
         if raw not in list(words):
             known = ", ".join(repr(word) for word in words[:-1])
-            raise source.fail(path, f"is {shown(raw)}; allowed are {known} and {words[-1]!r}", raw, words)
+            raise source.fail(path, f"is {shown(raw)}; allowed: {known} and {words[-1]!r}", raw, words)
         return raw
     wanted = {float: "a number", int: "a whole number", bool: "true or false", str: "a string"}[hint]
     good = isinstance(raw, hint) or (hint is float and isinstance(raw, int))
@@ -466,7 +466,7 @@ def _scalar(hint: Any, raw: Any, factor: float, limits: Range, source: Source, p
         raise source.fail(path, f"is {shown(raw)}; the largest number allowed in a file is {MAX_NUMBER:g}", raw, limits)
     if not limits.low <= value <= limits.high:
         allowed = Range(limits.low / factor, limits.high / factor)
-        raise source.fail(path, f"{shown(raw)} is out of range; allowed is {allowed}", raw, allowed)
+        raise source.fail(path, f"{shown(raw)} is out of range; allowed: {allowed}", raw, allowed)
     return value
 
 
@@ -481,7 +481,7 @@ def check_points(
 ) -> None:  # fmt: skip
     """Check that the points of a curve increase, are not too few or too many, and have columns of equal length."""
     if not count.low <= len(points) <= count.high:
-        raise error(f"has {len(points)} points; allowed is {count}", key=key)
+        raise error(f"has {len(points)} points; allowed: {count}", key=key)
     for before, after in itertools.pairwise(points):
         if not before < after:
             raise error(f"does not increase from {before:g} to {after:g}", key=key)

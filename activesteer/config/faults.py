@@ -52,11 +52,11 @@ SENSORS: Final = {
 KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
     "runaway": "an actuator runs to its stop, brake and motor to their strength, a sensor reads the end of its range",
-    "float": "a steering actuator is cut from its drive and moves freely",
+    "float": "a steering actuator is disconnected from its drive and moves freely",
     "offset": "the demand of an actuator, or the reading of a sensor, has an offset",
     "reversed": "demand or reading has the opposite sign",
     "delayed": "demand or reading comes late",
-    "dropout": "demand or reading is missing and taken for zero",
+    "dropout": "demand or reading is missing and treated as zero",
 }
 """Kind of fault -> its effect."""
 
@@ -134,7 +134,7 @@ class Fault:
         if self.kind == "offset" and self.size == 0.0:
             raise ManeuverError("is 0, which has no effect", key=needed, value=0.0)
         if self.side not in (None, "left", "right"):
-            raise ManeuverError(f"is {self.side!r}; allowed are 'left' and 'right'", key="side", value=self.side)
+            raise ManeuverError(f"is {self.side!r}; allowed: 'left' and 'right'", key="side", value=self.side)
 
     @property
     def _needed(self) -> str | None:

@@ -10,18 +10,19 @@ actuator is at its limit or too slow, the other one keeps the moment rather than
 force slides outwards, a car that lacks the moment spins. One axle takes over from the other one with the lag of the
 actuators, so that the noise of the feedback beyond a limit does not reach it.
 
-The state feedback counts on straight axle curves. With a large sideslip angle these make a large moment that turns the
-car back, so the feedback asks the front wheels to cancel it; but an axle that slides does not make it. So the moment
-that the feedback expects, with straight curves about the slip angles of the desired turn,
+The state feedback assumes straight axle curves. With a large sideslip angle these give a large moment that turns the
+car back, and the feedback demands that the front wheels cancel it. But an axle that slides does not create this moment.
+Therefore the moment that the feedback expects, with straight curves about the slip angles of the desired turn,
 
     M_l = l_V C_V (alpha_V - alpha_V* + F_V*/C_V) - l_H C_H (alpha_H - alpha_H* + F_H*/C_H)
 
 is compared with the moment M of the curved axles. If the front force turns the car more than wanted, the front wheels
-give up the share s = (M - M_l) / (l_V F_V) of their force, at most all of it, and go by s towards the slip angle of
-what is left. Within the straight part of the curves M = M_l, and the angles stay as they are.
+give up the fraction s = (M - M_l) / (l_V F_V) of their force, at most all of it. Their slip angle moves by the same
+fraction towards the slip angle of the remaining force. Within the straight part of the curves M = M_l, and the angles
+stay as they are.
 
-No angle is larger than its actuator removes in the time in which the car answers: an angle that stays after the driver
-has steered back turns the car further in.
+No angle is larger than its actuator can remove in the time in which the car responds: an angle that remains after the
+driver has steered back turns the car further in.
 
 Source: T. A. Johansen and T. I. Fossen, Control allocation - A survey, Automatica 49 (2013).
 """
@@ -99,7 +100,7 @@ def allocated(
         driver_rad: The driver's angle at the road wheels.
         at_rad: Measured angles of superposition and rear wheels.
         demand_rad: Angles that the state feedback demands, without limits.
-        range_rad: Least and largest superposition angle that are allowed within the limits.
+        range_rad: Smallest and largest superposition angle that are allowed within the limits.
         works: Whether superposition and rear steering work.
         ay_mps2: Lateral acceleration of the desired turn [m/s2].
         authority: Factor on the demands of the state feedback, 0 to 1 [-].

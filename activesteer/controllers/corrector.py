@@ -18,8 +18,8 @@ def rear_direction(error_radps: float) -> int:
 
     The front wheels turn the other way.
 
-    With oversteer, the error of desired less actual yaw rate has the sign against the turn, and the rear wheels turn in
-    the direction of the yaw rate; with understeer they turn against it.
+    With oversteer, the error of desired minus actual yaw rate has the sign against the turn, and the rear wheels turn
+    in the direction of the yaw rate; with understeer they turn against it.
 
     Source: Dorsch 2012, Table I and Fig. 10.
     """
@@ -76,7 +76,7 @@ class Corrector(NativeBlock):
         With only the proportional term it has the sign of the error.
 
         Args:
-            error_radps: Desired less actual yaw rate [rad/s].
+            error_radps: Desired minus actual yaw rate [rad/s].
             saturated: Active limit: 1 if a larger angle is cut off, -1 if a smaller angle is, otherwise 0. The integral
                 then moves away from the limit only.
         """

@@ -12,8 +12,8 @@ with the error of the yaw rate, desired minus actual. The outer front wheel crea
 
 During an intervention the drive force is reduced by the brake force. The anti-lock system prevents locking.
 
-Sources: 49 CFR 571.126 S4; A. van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE 2000-01-1633. Band, limit
-and times are chosen.
+Sources: 49 CFR 571.126 S4; A. van Zanten, Bosch ESP Systems: 5 Years of Experience, SAE 2000-01-1633. Band, limit and
+times are our choice.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Esc:
 
 
 def beyond(value: float, band: float) -> float:
-    """Return the excess of a value beyond a dead band about 0."""
+    """Return by how much a value exceeds a dead band around 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 
 
@@ -86,7 +86,7 @@ def wheel_torques(
 
     Args:
         moment_Nm: Yaw moment, left positive [Nm].
-        yaw_rate_radps: Yaw rate; the outer front wheel makes a moment against it, the inner rear wheel a moment with
+        yaw_rate_radps: Yaw rate; the outer front wheel creates a moment against it, the inner rear wheel a moment with
             it.
         levers: Return value of `brake_levers`.
         limit_Nm: Largest torque of a wheel [Nm].

@@ -44,7 +44,7 @@ _UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
 """Keys of the table [controllers] that set the time of a command and of its arrival."""
 
 _MAX_ANGLE_RAD: Final = 1.0
-"""Largest angle of a command; a larger one is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command; a larger one is treated as a mistake, such as degrees [rad]."""
 
 _MAX_TORQUE_NM: Final = 1e5
 """Largest torque of a command: more than any brake or engine has [N m]."""
@@ -162,7 +162,7 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
 
     Returns:
         Dotted keys in SI, such as `controllers.ars.limit_rad` or `controllers.YawBeta.k_beta`; no gains that a variant,
-        or text behind a `?`, has fixed.
+        or text after a `?`, has fixed.
     """
     plugin, table = controller_spec(given), f"{CONTROLLER.table}."
     if not plugin.is_builtin:
@@ -178,13 +178,13 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
 
     Args:
         given: See `controller_spec`.
-        setup: What the controller may know of the car.
+        setup: Properties of the car that the controller may know.
 
     Returns:
         The controller; a user's own is wrapped so that its errors name file and class.
 
     Raises:
-        ControllerError: there is no such controller, or it cannot be made.
+        ControllerError: there is no such controller, or it cannot be created.
     """
     return controller_spec(given).make(setup)
 

@@ -5,32 +5,34 @@ The angles come from `lqr` with its allocation, within their limits and rates (`
 
     M_s = J_z (error beyond its band) / T_r + J_z (sideslip beyond its limit) / T_b^2
 
-where the desired yaw rate falls if the road does not bear the turn (`BorneTurnReference`). The angles still change the
-moment by M_u within the time ahead. What is missing grows with the size of the stability demand, from zero on:
+where the desired yaw rate falls if the road does not support the turn (`BorneTurnReference`). The angles still change
+the moment by M_u within the time ahead. The missing moment grows with the size of the stability demand, from zero on:
 
     M_x = min(|M_s| / M_0, 1) max(|M_s| - M_u, 0),                       to the side of M_s
 
-It counts whatever the state feedback wants: while an axle slides, the feedback mostly fights the sideslip, with both
-axles to the same side. In every call a quadratic programme allocates M_x to the brake forces F_i:
+It does not depend on the demand of the state feedback: while an axle slides, the feedback mostly acts against the
+sideslip, with both axles to the same side. In every call a quadratic programme allocates M_x to the brake forces F_i:
 
     minimise    ((B F - M_x) / M_1)^2 + |F|^2 / F_0^2 + c sum F_i
     subject to  0 <= F_i <= the limit of `esc`
 
-B holds the lever arms, and the side force that a wheel loses while it brakes: a fully used front tyre that brakes turns
-the car less into the turn, a rear tyre more. So the outer front wheel brakes against oversteer, and the inner rear
-wheel against understeer. The cost c of a brake force keeps the brakes idle for a moment below the threshold M_0.
+B holds the lever arms, and the side force that a wheel loses while it brakes: if a tyre at its limit brakes, the car
+turns in less with a front tyre, and more with a rear tyre. The outer front wheel therefore brakes against oversteer,
+and the inner rear wheel against understeer. The cost c of a brake force keeps the brakes idle for a moment below the
+threshold M_0.
 
-On a road of two sides the anti-lock system holds back the brakes of the better side, to help the driver. Here the
-steering compensates the moment of the brakes (see `lqr`), so the sides may differ more. The controller sets this
+On split friction, the anti-lock system limits the brakes on the side with higher friction, to help the driver. Here the
+steering compensates for the moment of the brakes (see `lqr`), so the sides may differ more. The controller sets this
 pressure difference: a limit that falls with the errors of the car, and at most what the remaining angles can hold with
-the tyres in their current state. It falls in turns too: there the outer rear wheel needs its side force.
+the tyres in their current state. It also falls in turns, where the outer rear wheel needs its side force.
 
 If an actuator does not follow its demand (`SupervisedActuator`), it holds its position. The state feedback is then
 computed only for the other actuator, about the turn that is still possible. The controller gets no message about a
 fault.
 
-Both demands of the steering fade while the estimator does not explain the car (see `lqr`), M_x only while it does not
-explain the yaw rate. Behind a jump of friction it explains the yaw rate, and the brakes must act.
+Both demands of the steering fade while the estimator does not explain the motion of the car (see `lqr`). M_x fades only
+while the estimator does not explain the yaw rate. After a jump of friction it explains the yaw rate, and the brakes
+must act.
 
 On a car whose electric axles can split their torque (`tv`), the difference of each axle is a further unknown, as the
 force D that the right wheel gets and the left one loses, at the cost D^2 / F_0^2 and without a threshold: the motors
@@ -94,7 +96,8 @@ class SupervisedActuator:
     An actuator is suspected if all demands of a window were on the same side of its position, by more than a tolerance,
     and it has not moved there by a tenth of the least distance. It counts as failed, until the end of the run, once it
     is suspected for as long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator
-    that is stuck, floats or runs away does not. An actuator that follows a demand that has turned back is sound.
+    that is stuck, floats or runs away does not. An actuator that follows a demand which has turned back counts as
+    working.
 
     Attributes:
         failed: Whether the actuator has failed.
@@ -212,7 +215,7 @@ class Integrated:
         solution = self._solve(hessian, gradient, self._no_rows, *bounds).tolist()
         self._demand_rad = added, rear
         self._lqr.apply(added, rear)
-        # The anti-lock system lets a braked wheel slip more: the solver's last digits are no demand.
+        # The anti-lock system lets a braked wheel slip more: the solver's last digits are not a demand.
         fl, fr, rl, rr = (
             _KILO * force_kN * radius_m if force_kN > _LEAST_KN else 0.0
             for force_kN, radius_m in zip(solution[:_BRAKES], self._radii_m, strict=True)

@@ -1,9 +1,9 @@
 """Linear form of a controller about straight driving, from its equations or its frequency response.
 
 A controller gets the measurements of a car that drives straight ahead until it has settled, and then a small pulse in
-one of them. The difference to its answer without the pulse is its impulse response. The Fourier sum of that is its
-frequency response, exact for a controller that is linear about this point. An observer, a programme without active
-limits and a user's own code thus have a frequency response like a transfer function.
+one of them. The difference from its response without the pulse is its impulse response. The Fourier sum of the impulse
+response is the frequency response, exact for a controller that is linear about this point. An observer, a programme
+without active limits and a user's own code thus have a frequency response like a transfer function.
 """
 
 from __future__ import annotations
@@ -110,9 +110,9 @@ _PULSE: Final = {"yaw_rate_radps": 1e-4, "ay_mps2": 1e-3, "rear_steer_rad": 1e-5
 _SETTLE_S: Final = 2.0
 _LENGTH_S: Final = 8.0
 _LEFT: Final = 0.02
-"""Fraction of the largest answer that may remain at the end: an estimator learns the offset of a sensor slowly [-]."""
+"""Fraction of the largest response that may remain at the end: an estimator learns a sensor's offset slowly [-]."""
 _NONLINEARITY: Final = 0.01
-"""Tolerated error when half a pulse must give half the answer [-]."""
+"""Tolerated error when half a pulse must give half the response [-]."""
 
 
 def pulse_responses(
@@ -130,13 +130,14 @@ def pulse_responses(
         interval_s: Time between two calls [s].
         name: Name of the controller, for the message.
         held: Signal to two numbers of calls: for how long a sample of its sensor is held, and the offset of the first
-            call that sees it. An estimator that takes each sample once answers the whole sample, not one call of it.
+            call that sees it. An estimator that takes each sample once responds to the whole sample, not to one call of
+            it.
 
     Returns:
-        Shape (calls, len(COMMANDS), len(SIGNALS)): answer per unit of a sample, from the call that sees it on.
+        Shape (calls, len(COMMANDS), len(SIGNALS)): response per unit of a sample, from the call that sees it on.
 
     Raises:
-        ControllerError: the answer to a small pulse is not proportional to it, or does not end.
+        ControllerError: the response to a small pulse is not proportional to it, or does not end.
     """
     held = held or {}
     settled = copy.deepcopy(controller)

@@ -16,10 +16,10 @@ force:
 
     f* - M / (l C_V),  g* + M / (l C_H)
 
-In a steady turn, snow looks like dry road with soft tyres, and a car with soft front tyres turns less. Steered to the
-turn of new tyres, its rear axle could slide on snow. So as far as the friction is unknown, a car that understeers more
-by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle. Both axles then turn by
-the same angle, which leaves the yaw rate as it is.
+In a steady turn, snow looks like dry road with soft tyres, and a car with soft front tyres turns less. If it were
+steered to the turn of new tyres, its rear axle could slide on snow. Therefore, as far as the friction is unknown, a car
+that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle.
+Both axles then turn by the same angle, which leaves the yaw rate as it is.
 
 u* are the angles of the turn at the time when the current demand takes effect, a lag T_a and a call ahead. The law is
 
@@ -95,7 +95,7 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_
     ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction", "friction_std", "front_stiffness", "rear_stiffness"),
 )
 _SAME_RAD: Final = 1e-6
-"""Difference of an angle from its demand that is no limit [rad]."""
+"""Difference of an angle from its demand that does not count as a limit [rad]."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -109,7 +109,7 @@ class Turn(NamedTuple):
         sideslip_rad: Steady-state sideslip angle [rad].
         steady_rad: Steady-state angles [rad].
         demand_rad: Angles that the state feedback demands, without limits [rad].
-        range_rad: Least and largest superposition angle that the driver and the yaw rate allow [rad].
+        range_rad: Smallest and largest superposition angle that the driver and the yaw rate allow [rad].
     """
 
     estimate: Estimate
@@ -127,7 +127,7 @@ class Lqr(NativeBlock):
     reads = ("lqr", "servos", "estimator")
     compiled_in = "activesteer.controllers.native_lqr"
     rates_radps = MappingProxyType({"rear": math.radians(25.0), "superposition": math.radians(25.0)})
-    """It removes 3 deg within the time in which the car answers, `removal_s`."""
+    """It removes 3 deg within the time in which the car responds, `removal_s`."""
     gains = LqrParameters
     derived = ("_schedule", "_superposition_works", "_rear_works")
     _estimator: Estimator

@@ -279,7 +279,7 @@ class SplitAxle(NamedTuple):
         torque_Nm: Largest torque of one wheel [Nm].
         power_W: Largest power of one wheel [W].
         regeneration: Fraction of both that the motors can absorb [-].
-        difference_Nm: Largest difference of the torques, right less left [Nm].
+        difference_Nm: Largest difference of the torques, right minus left [Nm].
         efficiency: Efficiency in both directions [-].
     """
 

@@ -5,7 +5,7 @@ A registered class has the method `step` of `Controller` and is made from a `Con
     reads        keys of the table [controllers] that it reads
     interval_s   time between two calls [s]; every step of the simulation if absent
     rates_radps  rates of the actuators that it needs at the road wheels, by the names of `SteeringRates` [rad/s];
-                 a run with slower actuators notes it; absent if any rate suffices
+                 a run with slower actuators records a note; absent if any rate suffices
     gains        dataclass of its own table, whose values are those of `models/controllers/NAME.toml`;
                  absent if the vehicle file gives all gains
 """

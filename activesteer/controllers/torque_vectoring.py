@@ -14,11 +14,11 @@ limit, the other one takes the rest. The limits of a wheel are
 
 with the estimated friction mu, the fraction u of it that may be used, a fraction s that stays for the moment in a turn
 at the limit, and the wheel load F_z of the measured lateral acceleration. Both limits fade to zero for a wheel whose
-slip grows from 3 to 6 %, since the estimate of a sudden change of friction comes late. Last, q is reduced so far that
-the electric power stays within the limits of the battery. While the driver brakes, the controller rests.
+slip grows from 3 to 6 %, since the estimate of a sudden change of friction comes late. Last, q is reduced until the
+electric power is within the limits of the battery. While the driver brakes, the controller is inactive.
 
-Unlike the brakes of `esc`, the moment costs no speed, so the controller acts at every error. Electric motors answer
-within some 15 ms, faster than hydraulics.
+Unlike the brakes of `esc`, the moment costs no speed, so the controller acts at every error. Electric motors respond
+within about 15 ms, faster than hydraulics.
 
 Source: L. De Novellis, A. Sorniotti, P. Gruber, Wheel torque distribution criteria for electric vehicles with
 torque-vectoring differentials, IEEE Trans. Vehicular Technology 63 (2014). The law is the law of `esc` without

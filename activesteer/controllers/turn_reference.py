@@ -15,7 +15,7 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, 
 class TurnReference(NativeBlock):
     """Desired yaw rate (eqs. 3 and 6) with the estimated friction, behind a first-order lag.
 
-    The lag is a distance, like the lag of the tyres: at twice the speed the car answers in half the time.
+    The lag is a distance, like the lag of the tyres: at twice the speed the car responds in half the time.
     """
 
     _single_track: SingleTrack
@@ -67,7 +67,7 @@ def _desired(block: TurnReference, angle_rad: float) -> float:
 class BorneTurnReference(TurnReference):
     """Desired yaw rate that falls if the measured lateral acceleration is too small for it.
 
-    A car turns at a_y / v while its sideslip angle is constant; what it turns faster is growing sideslip. If the
+    A car turns at a_y / v while its sideslip angle is constant; any faster rotation is growing sideslip. If the
     measured |a_y| is short of v |r*| by more than D, the desired yaw rate r* falls by the rest over v, at most to zero.
     The compared r* passes a lag T_a, and does not exceed the current r*. Without this rule, a yaw moment turns a car
     whose front wheels have reached ice further in, and the car slides when its rear wheels reach the ice too: the

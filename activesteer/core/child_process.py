@@ -86,9 +86,9 @@ class Child:
         try:  # a process that the child started may hold the connection longer than the child lives
             code = self._process.wait(0.0 if late else _LAST_WORD_S)
         except subprocess.TimeoutExpired:
-            return f"hangs: {doing} took longer than {limit_s:g} s" if late else f"closed its connection in {doing}"
+            return f"hangs: {doing} took longer than {limit_s:g} s" if late else f"closed its connection during {doing}"
         end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return f"crashed in {doing}: its process ended with {end}"
+        return f"crashed during {doing}: its process ended with {end}"
 
     def _received(self, length: int, end_s: float) -> bytes:
         content = bytearray()

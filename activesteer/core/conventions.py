@@ -78,8 +78,8 @@ def run_looks(names: Iterable[str]) -> dict[str, RunLook]:
 
     Returns:
         Looks by name, in drawing order: the systems in the paper's order, always in the same colours, then the others.
-        Another run takes a system's colour only if all others are used up and that system is not shown. Beside other
-        runs, the systems have their short names too.
+        Another run takes a system's colour only if all others are used up and that system is not shown. Next to other
+        runs, the systems also have their short names.
     """
     given = list(dict.fromkeys(names))
     known = [name for name in SYSTEM_LABELS if name in given]

@@ -30,12 +30,12 @@ def shown_path(path: str | os.PathLike[str]) -> str:
 
 
 def writing(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Context that converts an OSError of writing into an error of class `error`."""
+    """Context that converts an OSError while writing into an error of class `error`."""
     return _refused("write", path, error)
 
 
 def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> AbstractContextManager[None]:
-    """Context that converts an OSError of reading into an error of class `error`."""
+    """Context that converts an OSError while reading into an error of class `error`."""
     return _refused("read", path, error)
 
 

@@ -1,9 +1,9 @@
 """Table of all metrics: display unit, smallest difference that counts, and preferred direction.
 
-A metric is declared here once. An evaluation that returns another name is an error; see `analysis.metrics`.
+A metric is declared here once. An evaluation that returns another name raises an error; see `analysis.metrics`.
 
-The significances rest on what is published about sensors and humans. The guide (`docs/claims.md`) says that the results
-of an earlier driver and earlier gains were known when these sizes were written down.
+The significances are based on published data about sensors and humans. The guide (`docs/claims.md`) says that the
+results of an earlier driver and earlier gains were known when these sizes were written down.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ParameterError, nearest_names
 
 STEER_RAD: Final = math.radians(0.05)
-"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to some 3 minutes of arc. A demand
-counts as `claims.judge` says, so that noise cannot pass for it."""
+"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to about 3 minutes of arc. A
+demand counts as `claims.judge` says, so that noise cannot pass for it."""
 SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
 SIDESLIP_RAD: Final = math.radians(0.1)

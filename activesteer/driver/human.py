@@ -55,7 +55,7 @@ class HumanDriver(NativeBlock):
         """Compute the gains on a path at a speed for compiled code, and return their number.
 
         Raises:
-            SimulationDiverged: the speed is beyond all reason.
+            SimulationDiverged: the speed is implausibly high.
         """
         rounded = round(speed_mps / SPEED_STEP_MPS)
         if not 0 <= rounded < N_SPEEDS:
@@ -111,7 +111,7 @@ _MAX_TABLES: Final = 64
 class SetpointTable(NamedTuple):
     """Setpoints of successive steps for compiled code.
 
-    The last one holds on.
+    The last setpoint is held.
 
     Attributes:
         rows: Records of `SETPOINT`.
@@ -156,7 +156,7 @@ class SharedTables:
                 del self._kept[next(iter(self._kept))]
             self._kept[key] = maneuver, from_step(first)  # with the manoeuvre, whose id then stays its own
         table = self._kept[key][1]
-        if step >= first + table.steps:  # the path changes on the way
+        if step >= first + table.steps:  # the path changes during the run
             return from_step(step), step
         return table, first
 
@@ -217,7 +217,7 @@ def follow(human, setpoint, line, measured, motion, engine_radps, low_Nm, high_N
 
 
 _MAX_ANGLE_RAD: Final = 50.0
-"""Largest angle of a command. A larger one is taken for a mistake, such as degrees [rad]."""
+"""Largest angle of a command. A larger one is treated as a mistake, such as degrees [rad]."""
 _FRONT_STEER: Final = DriverCommand._fields.index("front_steer_demand_rad")
 _GEARS: Final = (-1, 0, 1)
 _MAX_TORQUE_NM: Final = 1e6
@@ -226,7 +226,7 @@ _MAX_TORQUE_NM: Final = 1e6
 
 @dataclass(frozen=True)
 class _DriverKind(Kind):
-    """Kind of block for drivers. A command is completed by the angle at the road wheel."""
+    """Block kind of drivers, which adds the angle at the road wheel to each command."""
 
     def completed(self, command: Any, name: str, setup: DriverSetup, said: str) -> DriverCommand:
         """Return a command with the angle at the road wheel (see the base class)."""

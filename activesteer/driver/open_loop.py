@@ -17,16 +17,16 @@ _STANDSTILL_MPS: Final = 0.05
 class SpeedHold(NativeBlock):
     """Speed control by drive torque and engine braking.
 
-    The integral stands still while a limit is active.
+    The integral is frozen while a limit is active.
 
     A negative speed engages the reverse gear: the engine then drives backwards and brakes forwards.
 
-    If the driven wheels are too fast for the speed of the car, they spin. The driver takes the foot back while they
-    spin, and presses down again slowly when they roll.
+    If the driven wheels are too fast for the speed of the car, they spin. The driver releases the accelerator while
+    they spin, and presses it again slowly when they roll.
 
     Attributes:
         drive: Engine and gearbox.
-        saturated: Whether the last step reached a limit of the engine or took the foot back.
+        saturated: Whether the last step reached a limit of the engine or released the accelerator.
     """
 
     _gain_Nmspm: float
@@ -207,7 +207,7 @@ def turned(
 
 
 _TIME_CONSTANT_S: Final = 0.5
-"""Time constant for an error of the curvature [s]: slower than the car's answer, faster than the rise of the speed."""
+"""Time constant for a curvature error [s]: slower than the car's response, faster than the rise of the speed."""
 _MIN_SPEED_MPS: Final = 1.0
 """Below this speed there is no correction: yaw rate over speed is not the curvature of the path [m/s]."""
 
@@ -216,7 +216,7 @@ class ConstantRadiusDriver(NativeBlock):
     """Steering by curvature: Ackermann angle, and the integral of the curvature error.
 
     The measured curvature is yaw rate over speed: the curvature of the path while the sideslip angle is constant. The
-    integral stands still while the steering wheel is at its stop.
+    integral is frozen while the steering wheel is at its stop.
     """
 
     _wheelbase_m: float
@@ -231,7 +231,7 @@ class ConstantRadiusDriver(NativeBlock):
         self._correction_1pm = 0.0
 
     def step(self, setpoint: Setpoint, measurement: Measurement, motion: Motion) -> DriverCommand:
-        """Return the command of a driver, with the steering wheel angle of a setpoint without a curvature."""
+        """Return the command (see `Driver`). A setpoint without a curvature gives the steering wheel angle instead."""
         curvature = setpoint.curvature_demand_1pm
         if curvature is None:
             return self.robot.step(setpoint, measurement, motion)

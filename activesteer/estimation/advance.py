@@ -67,7 +67,7 @@ covariances include errors that last; where wheels reach snow they are 2 to 5 fo
 share of the samples with the true friction inside two deviations, on 112 recordings (comparison, seed 9)."""
 _SHOWING_MPS2: Final = 2.0
 """Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2].
-With 1 m/s2 a curve with a bank of 4 deg was taken for snow."""
+With 1 m/s2 a curve with a bank of 4 deg was mistaken for snow."""
 _SHOWING_USED: Final = 0.5
 """Fraction of the assumed friction from which errors show that it is wrong, where this is less: a filter that was sure
 of ice stayed lost for a second. The first value that was tried."""

@@ -8,7 +8,7 @@ leans with the body. Differences give the derivatives of the model. The unknowns
     k_i     stiffness of the tyres of an axle relative to new ones, of the size `stiffness_std`, for `stiffness_s`: it
             shows at small slip angles, where the friction does not
     b_y     offset of the lateral accelerometer, likewise
-    g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not feel it
+    g_y     gravity across an inclined road, likewise: it moves the car, and the accelerometer does not measure it
     u       friction, likewise, about its assumed value; it is observable only from forces near the limit
     w       friction of the rear tyres relative to the front tyres, likewise, about 1 for `stiffness_s`
     b_r     offset of the yaw rate sensor, a random walk
@@ -21,9 +21,9 @@ lateral acceleration is expected from its values at u and at sqrt(3) standard de
 
     slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
 
-A friction that jumps further than this range would be taken for soft tyres or for an offset of the accelerometer all
-the same. So a value with a surprising error says nothing about stiffness and offset, and `reopen` makes the friction
-unknown again (see `advance`).
+A friction that jumps further than this range would be mistaken for soft tyres or for an offset of the accelerometer all
+the same. Therefore a value with an unexpectedly large error changes neither stiffness nor offset, and `reopen` makes
+the friction unknown again (see `advance`).
 
 Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the

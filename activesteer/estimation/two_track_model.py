@@ -14,10 +14,10 @@ the road by similarity (u w at the rear axle, which may have other tyres), and t
 relative to new ones: u F_y(k_i a_i / u, F_z), which changes the slope of the curve and not its peak, as LKY does in the
 Magic Formula. With a longitudinal force, a friction circle reduces u. That lowers the largest force but hardly the
 force at small slip angles, as in the Magic Formula of combined slip (0.7 of the friction for the brake take 8 % at 2
-deg). The body rolls by p as a mass on a spring. The points of the wheels whose slip the tyres feel, contact points or
-wheel centres, then move sideways by h_i p' relative to the centre of gravity. Springs and dampers of the body load the
-wheels. The compliance c_i is the difference between the identified cornering stiffness of the axle and the stiffness of
-its tyres:
+deg). The body rolls by p as a mass on a spring. The points of the wheels whose slip acts on the tyres, contact points
+or wheel centres, then move sideways by h_i p' relative to the centre of gravity. Springs and dampers of the body load
+the wheels. The compliance c_i is the difference between the identified cornering stiffness of the axle and the
+stiffness of its tyres:
 
     c_i = 1 / C_i - 1 / (2 C_tyre) - q_i k / m_i
 
@@ -78,7 +78,7 @@ _LONGEST_STEP_S: Final = 0.005
 
 @inlined
 def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
-    """Interpolate the lateral force of a tyre in its grid, at an angle from 0 on."""
+    """Interpolate the lateral force of a tyre in its grid, at a non-negative slip angle."""
     rows, columns = forces_N.shape
     across = min(angle_rad / angle_step_rad, columns - 1.000001)
     down = min(max(load_N / load_step_N, 0.0), rows - 1.000001)

@@ -214,7 +214,7 @@ class CarVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.fl
             ActiveSteerError: an input is wrong.
         """
         if render_mode is not None:
-            raise ParameterError("is offered by the single environment only", key="render_mode", value=render_mode)
+            raise ParameterError("is available in the single environment only", key="render_mode", value=render_mode)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**CarEnv.metadata, "autoreset_mode": self.autoreset_mode}
         self.num_envs, self.episodes = num_envs, Episodes(task, num_envs, **_known(options))

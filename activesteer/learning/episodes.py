@@ -280,7 +280,7 @@ class Episodes:
 
         Args:
             actions: Shape (n, numbers); an action beyond its bounds is limited to them.
-            episodes: Mask of the episodes that continue; by default all. The others stand still.
+            episodes: Mask of the episodes that continue; by default all. The others wait.
 
         Raises:
             ParameterError: an action is not finite, or an episode has not been reset.

@@ -102,12 +102,12 @@ class Maneuver(ABC):
 
     @property
     def ground(self) -> Road:
-        """Road for the car, with its friction along the course if the road follows it."""
+        """Road for the car. If the road follows the course, its friction does too."""
         return self.road.laid(self.course)
 
     @property
     def search(self) -> Search | None:
-        """Search that must be driven before the manoeuvre, or None if all values are known."""
+        """Search to be driven before the manoeuvre, or None if all values are known."""
         return None
 
     def settling_setpoint(self) -> Setpoint:

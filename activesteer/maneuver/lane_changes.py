@@ -59,7 +59,7 @@ _AFTER_S: Final = 3.5
 
 @dataclass(frozen=True, kw_only=True)
 class AlongCourse(Maneuver):
-    """Base of the kinds along a course at constant speed."""
+    """Base of the kinds of manoeuvres that follow a course at constant speed."""
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and passes the last gate within the run."""
@@ -303,7 +303,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
         if self.lane.margin_m > maximum:
             raise ManeuverError(
                 f"is {self.lane.margin_m:g} m, but the {narrowest.name} is {lane_width:.3g} m wide and "
-                f"the car {width:g} m; allowed is 0 to {maximum:.3f} m",
+                f"the car {width:g} m; allowed: 0 to {maximum:.3f} m",
                 key="lane.margin_m",
                 value=self.lane.margin_m,
                 allowed=Range(0.0, maximum),
@@ -373,7 +373,7 @@ class Slalom(AlongCourse, kind="slalom"):
 
     Between the cones the path is a cosine with its crests at the cones. It leaves the line of the cones one spacing
     before the first crest, with no more curvature than the cosine. Between the last two cones it straightens, with 15 %
-    more curvature. Behind the last cone it is straight and parallel to the row, so that the car oscillates there only
+    more curvature. After the last cone it is straight and parallel to the row, so that the car oscillates there only
     by itself. Both transitions are quintics without a jump of curvature.
     """
 

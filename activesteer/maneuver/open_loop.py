@@ -30,7 +30,7 @@ class SteeringTable:
     factor: float = 1.0
     """Scale of the column, for a recorded signal with a separate scale."""
     delay_s: float = 0.0
-    """Time by which the column comes later, for a recorded signal with a separate clock [s]."""
+    """Delay of the column, for a recorded signal with a separate clock [s]."""
 
     def __post_init__(self) -> None:
         """Check that times and exactly one angle column are given, and that factor and delay have an effect."""
@@ -47,7 +47,7 @@ class SteeringTable:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The column that is given."""
+        """Column that the table gives: angles or rack positions."""
         return self.steering_wheel_rad if self.rack_m is None else self.rack_m  # type: ignore[return-value]
 
 

@@ -1,6 +1,6 @@
 """Phases: inputs that follow each other, at given times or when the car reaches a state.
 
-Each phase moves steering wheel, speed and pedals to its values and ends by its condition. So a manoeuvre can react to
+Each phase moves steering wheel, speed and pedals to its values and ends by its condition. A manoeuvre can thus react to
 the car: the fishhook steers back when the roll rate has died away.
 """
 
@@ -146,7 +146,7 @@ class Phases(Maneuver, kind="phases"):
     phases: tuple[Phase, ...]
     """The phases."""
     repeat: Annotated[int, Range(1, 1000)] = 1
-    """How often the phases are driven."""
+    """Number of times that the phases are driven."""
     direction: Side = "left"
     """Direction of positive steering angles, rates, accelerations and y: `left` or `right`."""
     reference_angle_rad: Annotated[float, Range(0.0, 15.0)] | None = None

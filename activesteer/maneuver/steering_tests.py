@@ -83,7 +83,7 @@ class StepSteer(Maneuver, kind="step_steer"):
 
 
 def steady_turn_search(maneuver: Maneuver, step: StepInput, accept: Callable[[float], Maneuver]) -> Search | None:
-    """Return the search for the amplitude of a step that gives only its lateral acceleration."""
+    """Return the search for the amplitude of a step, if the table gives only its lateral acceleration."""
     wanted = step.lateral_acceleration_mps2
     if step.steering_wheel_rad is not None or wanted is None:
         return None
@@ -227,8 +227,8 @@ class RandomSteer(Maneuver, kind="random_steer"):
         least_Hz = random.lowest_Hz + _LINES / self.duration_s
         if not least_Hz <= random.highest_Hz <= _MOST_Hz:
             raise ManeuverError(
-                f"is {random.highest_Hz:g} Hz; above lowest_Hz, {random.lowest_Hz:g} Hz, and in {self.duration_s:g} s "
-                f"(duration_s), allowed is {least_Hz:g} to {_MOST_Hz:g} Hz",
+                f"is {random.highest_Hz:g} Hz; with lowest_Hz = {random.lowest_Hz:g} Hz and duration_s = "
+                f"{self.duration_s:g} s, {least_Hz:g} to {_MOST_Hz:g} Hz are allowed",
                 key="random.highest_Hz",
                 value=random.highest_Hz,
                 allowed=Range(least_Hz, _MOST_Hz),

@@ -129,7 +129,7 @@ FILTERS: Final[dict[str, Filter | None]] = {
 
 def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float]:
     """Return a filtered channel and the standard deviation of its noise, or 0 if unknown."""
-    # What a low-pass filter at a quarter of the sampling rate or lower removes is taken for noise: its median absolute
+    # What a low-pass filter at a quarter of the sampling rate or lower removes is treated as noise: its median absolute
     # deviation, which the short edges of a manoeuvre do not move. The noise is assumed white: below the cut-off
     # frequency it is as dense as above. A signal that the logger has filtered already shows no noise.
     values = recording[channel]

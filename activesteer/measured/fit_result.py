@@ -32,7 +32,7 @@ def autocorrelation_time(values: Array) -> float:
     """Return the autocorrelation time in samples, 1 for white noise.
 
     The time is one plus twice the sum of the autocorrelations, as far as these exceed their own noise. The mean is not
-    subtracted: an offset is no noise.
+    subtracted, because an offset is not noise.
 
     Source: A. Sokal, Monte Carlo methods in statistical mechanics, 1997, eq. 3.19: a window of five times the result.
     """
@@ -211,7 +211,7 @@ class Fit(NamedTuple):
                 if each.channel in SensorOffsetTable.__dataclass_fields__:
                     advice += f", or make sensor_offset.{each.channel.replace('_rad', '_deg')} a factor"
                 found.append(
-                    f"the residual of the {where} is a constant offset: measured less simulated is {offset}; {advice}"
+                    f"the residual of the {where} is a constant offset: measured minus simulated is {offset}; {advice}"
                 )
             elif left > _MUCH:
                 found.append(

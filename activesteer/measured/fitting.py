@@ -262,7 +262,7 @@ class _Problem:
         return dict(zip(self._study.keys, values.tolist(), strict=True))
 
     def answers_by(self, workers: Workers, progress: FitProgress) -> Callable[[list[Array]], list[Answer]]:
-        """Return a function that drives sets of parameters: each set in each recording, spread over workers."""
+        """Return a function that repeats every recording with each of several sets of parameters, on the workers."""
         rounds, best = 0, math.nan
 
         def answers(places: list[Array]) -> list[Answer]:

@@ -1,8 +1,8 @@
 """Validation of a car against the measured runs of a folder: prediction, fit and check.
 
 The *prediction* uses the vehicle file; of the factors, only those in `predict.factors` are free. The *fit* frees all
-factors. Both see only the fit windows and are judged in the check windows. The band around the prediction contains
-the curves with each interval at either end, after `predict.factors` were found again; effects of several intervals
+factors. Both use only the fit windows and are judged in the check windows. The band around the prediction contains
+the curves with each interval at either end, after `predict.factors` were fitted again; effects of several intervals
 are added.
 """
 

@@ -112,7 +112,7 @@ def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehic
         for name in sorted(repeated)[:_MOST_REPEATED]
     ]
     if len(repeated) > _MOST_REPEATED:
-        notes.append(f"{len(repeated) - _MOST_REPEATED} more names stand over several columns each")
+        notes.append(f"{len(repeated) - _MOST_REPEATED} more names belong to several columns each")
     sources = _mapped(chosen, files, table) if chosen.channels else _by_name(files, table, notes)
     read = {name: source.column.read() for name, source in sources.items()}
     lacking = {sources[name].file for name, (_, own) in read.items() if own is None}
@@ -206,7 +206,7 @@ def _by_name(files: _Files, table: Collection[str], notes: list[str]) -> dict[st
             base = signals.bracketed(column.name)[0]
             if base != column.name and signals.known_column(base, names, channels) is not None:
                 known_units = ", ".join(UNIT_NAMES)
-                notes.append(f"{shown(column.name)} is left out: its unit is unknown; known are {known_units}")
+                notes.append(f"{shown(column.name)} is left out: its unit is unknown; known: {known_units}")
             continue
         channel, stated, sign, sure = known
         if channel in sources:
@@ -247,7 +247,7 @@ def _shared_time(columns: list[Column], chosen: MeasurementMap, path: Path, *, n
     unit = chosen.time_unit or column.unit or known_time_unit(column.name)
     found = signals.written_unit(unit)
     if found is None or not alike(found, find_unit("s")):
-        raise RecordingError(f"the time has the unit {shown(unit)}; known are s, ms, us", file=path.name, value=unit)
+        raise RecordingError(f"the time has the unit {shown(unit)}; known: s, ms, us", file=path.name, value=unit)
     return _plausible(column.read()[0] * found.factor, column.name, path)
 
 

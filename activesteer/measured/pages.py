@@ -105,7 +105,7 @@ def picture(
     corridor = "corridor of the simulation" if across else "corridor"
     panels = [
         panel(shown.title, 0.0, overlay, areas, corridor),
-        panel(f"Measured less simulated [{shown.unit.name}]", found.simulated, residual, ()),
+        panel(f"Measured minus simulated [{shown.unit.name}]", found.simulated, residual, ()),
     ]
     return Picture("", panels, columns=2, height_in=2.6)
 
@@ -128,7 +128,7 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
     verdict = (passed if result.inside else failed)(f"{kept} of {len(result.judged)}")
     stage = "prediction" if result.fitted is None else "fitted car"
     lead: list[Text] = [
-        verdict + f" quantities of the {stage} keep their tolerance in the check windows, which no fit has seen."
+        verdict + f" quantities of the {stage} are within their tolerance in the check windows, which no fit has used."
     ]
     sections: list[Section] = []
     stages = {"predicted": result.predicted} | ({} if result.fitted is None else {"fitted": result.fitted})
@@ -157,8 +157,8 @@ def _runs(result: MeasuredValidation) -> tuple[list[Text], list[Section]]:
             sections.append(Section("Assumptions of the fit", points=rests_on(found), level=3))
     if result.ends:
         text = (
-            "The band contains the prediction with each value at either end of its interval. Before that, the free "
-            "factors of the prediction are found again. Effects of several intervals add up."
+            "The band contains the predictions with each value at either end of its interval. For each of them, the "
+            "free factors are fitted again. Effects of several intervals add up."
         )
         widths, ends = [], []
         for box in (one.box() for one in result.parts if one.band):

@@ -98,7 +98,7 @@ _MISTAKES: Final = {
         ("ay_mps2", "g", "m/s2"),
     )
 }
-"""Channel -> factor of the error if the first unit was taken for the second."""
+"""Channel -> factor of the error if the first unit was mistaken for the second."""
 _NEAR: Final = math.log(1.5)
 """Ratios within this range count as equal: ay/(v yaw rate) is 1 except for the change of the sideslip angle."""
 _LONGEST_STEP_S: Final = 1.0

@@ -169,7 +169,7 @@ class _ContentCache(FunctionCache):
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        # A full disk is no reason not to run what is already compiled.
+        # Code that is already compiled runs even if the disk is full.
         with contextlib.suppress(OSError):
             super().save_overload(sig, data)
             own = Path(self._cache_file._index_path)  # kept also where a clock that was set back dates it before others

@@ -59,7 +59,7 @@ def declared_by(origin: Any) -> dict[str, Declared]:
         if name not in names:
             raise ValueError(f"PARAMETERS names {name!r}, which is not an argument; {nearest_names(str(name), names)}")
         if wrong := [key for key in note if key not in _NOTES]:
-            raise ValueError(f"PARAMETERS[{name!r}]: {wrong[0]!r} is none of {', '.join(_NOTES)}")
+            raise ValueError(f"PARAMETERS[{name!r}]: {wrong[0]!r} is not one of {', '.join(_NOTES)}")
     return {name: _declared(name, named.get(name), notes.get(name, {})) for name in dict.fromkeys(names)}
 
 
@@ -170,7 +170,7 @@ class Plugin:
 
     @property
     def key(self) -> str:
-        """Name of the class or function, part of the keys of its parameters."""
+        """Name of the class or function, used in the keys of its parameters."""
         about = getattr(self.origin, "func", self.origin)
         return getattr(about, "__name__", type(about).__name__)
 
@@ -201,7 +201,7 @@ class Plugin:
             values: Name -> value.
 
         Raises:
-            ParameterError: a parameter does not exist, is given behind the `?` too, or a value is wrong.
+            ParameterError: a parameter does not exist, is also given after the `?`, or a value is wrong.
         """
         path = (self.kind.table, self.key)
         source = Source("", overridden=frozenset({".".join(path)}))

@@ -3,8 +3,8 @@
 In a file an event is a message of Foxglove's log, so other tools show it on their time axis. In the metadata the events
 are a list of tables with the fields of `Event`.
 
-A file may come from anywhere. Everything that reads recordings can handle what is accepted here: names are texts, sizes
-are numbers, and a small file cannot fill memory or time.
+A file may come from anywhere. Everything that reads recordings can handle what is accepted here: names are strings,
+sizes are numbers, and a small file cannot fill memory or time.
 
 A file holds, in this order: schemas and topics, attachments, the record of the run, the format record, chunks of about
 a second, the record of the result, metrics. Metadata values are JSON text, metrics are numbers as text.
@@ -343,7 +343,7 @@ class Link(NamedTuple):
         name: Name of the part.
         kind: `link`, `spring` or `damper`.
         points: Name of the body and point in its frame [m]; at least two.
-        radius_m: Radius in pictures [m].
+        radius_m: Radius in drawings [m].
         rgba: Colour and opacity, 0 to 1.
     """
 

@@ -117,7 +117,7 @@ def _decompressed(compression: str, data: bytes, size: int) -> bytes:
         return zstandard.ZstdDecompressor(max_window_size=limits.MAX_CHUNK_BYTES).decompress(data, max_output_size=size)
     if compression == "lz4":
         return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-    raise RecordingError(f"a chunk has the compression {compression!r:.40}; known are zstd and lz4")
+    raise RecordingError(f"a chunk has the compression {compression!r:.40}; known: zstd and lz4")
 
 
 def values_of(blocks: Iterable[Block], rows: int, channels: int) -> NDArray[np.float64]:

@@ -349,7 +349,7 @@ class ChannelTable:
         for column, channel in enumerate(self._channels):
             if not _NAME.fullmatch(channel.name) or channel.name == TIME:
                 raise RecordingError(
-                    f"channel name {channel.name!r:.300}: allowed are letters, digits, '_', a letter first, but not "
+                    f"channel name {channel.name!r:.300}: use letters, digits and '_', a letter first, but not "
                     f"{TIME!r}",
                     value=channel.name,
                 )
@@ -360,7 +360,7 @@ class ChannelTable:
                     )
             if not _GROUP.fullmatch(channel.group):
                 raise RecordingError(
-                    f"group {channel.group!r:.300} of channel {channel.name!r}: allowed are a to z, 0 to 9 and '_', "
+                    f"group {channel.group!r:.300} of channel {channel.name!r}: use a to z, 0 to 9 and '_', "
                     "a letter first",
                     value=channel.group,
                 )

@@ -121,7 +121,7 @@ _BLOCKS_IN_FLIGHT = 1  # More blocks would be lost by a kill, and would fill mem
 class McapWriter:
     """Stream of channel values and poses into an MCAP file that can be read at any time.
 
-    `write` encodes in the calling thread. A thread of its own compresses and writes, because zstd and file output
+    `write` encodes in the calling thread. A separate thread compresses and writes, because zstd and file output
     release the interpreter lock. The next `write` or `close` raises an error of that thread.
 
     The context manager closes the file in every case. After an exception it marks the file with `complete = false` and

@@ -123,7 +123,7 @@ def _lane(table: object, key: str) -> Lane:
     sides = [number(lane.get(field), f"{key}.{field}") for field in Lane._fields[1:]]
     found = Lane(text(lane.get("name", ""), f"{key}.name"), *sides)
     if not (found.start_x_m <= found.end_x_m and found.right_y_m <= found.left_y_m):
-        raise fail(key, f"is {tuple(sides)}: it must end behind its start, and its left edge be left of its right edge")
+        raise fail(key, f"is {tuple(sides)}: its end must be after its start, and its left edge left of its right edge")
     return found
 
 
@@ -200,7 +200,9 @@ class ProfileTable:
             if any(abs(value) > _HIGHEST_M for value in values or ()):
                 raise ManeuverError(f"is higher than {_HIGHEST_M:g} m", key=key)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
-            raise ManeuverError(f"is {self.s_m[-1] - self.s_m[0]:g} m long; allowed are {_MAX_LENGTH_M:g} m", key="s_m")
+            raise ManeuverError(
+                f"is {self.s_m[-1] - self.s_m[0]:g} m long; at most {_MAX_LENGTH_M:g} m is allowed", key="s_m"
+            )
 
     def grid(self) -> Grid:
         """Return the grid of heights."""

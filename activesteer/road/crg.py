@@ -7,9 +7,9 @@ step before their point.
 
 Read are: blocks `$ROAD_CRG`, `$ROAD_CRG_FILE` (a reference to another file), `$ROAD_CRG_MODS` (scales of heights,
 slope, banking, length, width and curvature; treatment of missing heights), and the data. Missing heights are filled
-from the nearest height towards the middle of the row, unless the file wants zero; a hole there is an error. The place
-of the line in the world and the border modes do
-not matter: the car enters the surface at its start, and `road.outside` rules what is beyond.
+from the nearest height towards the middle of the row, unless the file wants zero; a hole there raises an error. The
+place of the line in the world and the border modes do not matter: the car enters the surface at its start, and
+`road.outside` rules what is beyond.
 
 Source: ASAM OpenCRG 1.2.0, user guide and file format.
 """
@@ -186,7 +186,7 @@ def _columns(lines: list[str]) -> tuple[list[str], str]:
     """Return the names of the data columns in lower case, and the data format."""
     form = next((line[2:].strip().upper() for line in lines if line.startswith("#:")), "")
     if form not in (*_TEXT_CELLS, *_BINARY):
-        raise ManeuverError(f"the data format is {shown(form)}; known are {', '.join((*_TEXT_CELLS, *_BINARY))}")
+        raise ManeuverError(f"the data format is {shown(form)}; known: {', '.join((*_TEXT_CELLS, *_BINARY))}")
     names = [line[2:].partition(",")[0].strip().lower() for line in lines if line.startswith("D:")]
     limits.check_count(len(names), limits.MAX_CRG_COLUMNS, "data columns", ManeuverError)
     if not names:

@@ -1,7 +1,7 @@
 """Position of a car relative to a path, in native code because a driver needs it in every step.
 
-A place belongs to the nearest point of the path, so a place has one distance, also where the path crosses itself. Where
-a later pass is on an earlier one, the earlier pass counts. A grid over the road holds the nearest point of each
+A place belongs to the nearest point of the path, so a place has one distance, even where the path crosses itself. Where
+a later pass overlaps an earlier one, the earlier pass applies. A grid over the road holds the nearest point of each
 cell's centre; from there the kernel walks along the path to the nearest point of the place itself.
 """
 

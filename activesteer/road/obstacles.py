@@ -77,7 +77,7 @@ Kind = Literal["cosine_bump", "cleat", "kerb", "pothole", "cross_slope_ramp", "s
 SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
 """Name of a side -> its right and left border [m]."""
 FIRST_START_M: Final = 2.0
-"""Least distance of an obstacle from the start [m]: the front wheels stand some 1.3 m ahead of the origin."""
+"""Smallest distance of an obstacle from the start [m]: the front wheels are about 1.3 m ahead of the origin."""
 _LONG_M: Final = 1.5
 """Length from which a smooth obstacle hardly bends within the contact patch [m]: ten patches of 0.15 m."""
 
@@ -93,13 +93,13 @@ class Obstacle:
 
     kind: Kind
     """`cosine_bump`: h/2 (1 - cos(2 pi x/L)). `cleat`, `kerb`: a step of `height_m` with edges of `edge_m`. `pothole`:
-    the same downwards. `cross_slope_ramp`: the road turns about its middle to `slope` within `length_m` and stays so.
+    the same downwards. `cross_slope_ramp`: the road tilts about its middle to `slope` within `length_m` and stays so.
     `sine_wave`: h sin(2 pi x/L), growing over the first wave."""
     start_m: Annotated[float, Range(FIRST_START_M)]
     """Distance from the start of the manoeuvre, along x or along the path [m]."""
     length_m: Annotated[float, Range(1e-3)] | None = None
-    """Length [m]. Wavelength of a `sine_wave`. Length over which a `cross_slope_ramp` turns. Default: without end, for
-    a `kerb`."""
+    """Length [m]. Wavelength of a `sine_wave`. Length over which a `cross_slope_ramp` reaches its slope. A `kerb`
+    without a length has no end."""
     height_m: Height | None = None
     """Height; depth of a `pothole`; amplitude of a `sine_wave` [m]."""
     side: Side = "both"
@@ -110,7 +110,7 @@ class Obstacle:
     """Right border, instead of a side [m]."""
     angle_rad: Annotated[float, Range(-math.radians(80.0), math.radians(80.0))] = 0.0
     """Angle by which the obstacle is turned [rad], positive anticlockwise seen from above: a `kerb` at 70 deg is struck
-    at a flat angle, by the left wheels first."""
+    at a shallow angle, by the left wheels first."""
     edge_m: Annotated[float, Range(1e-3, 1.0)] = 0.01
     """Length over which the edges of a `cleat`, `kerb` or `pothole` rise [m]."""
     slope: Annotated[float, Range(-0.5, 0.5)] | None = None
@@ -185,7 +185,7 @@ class Roughness:
     OVERRULED: ClassVar = {"class_": {"spectrum_m3": None}}
 
     class_: Literal["A", "B", "C", "D", "E"] = "C"
-    """Class of ISO 8608, of which the surface has the geometric mean. The key in a file is `class`."""
+    """Class of ISO 8608. The surface has the geometric mean of the class. The key in a file is `class`."""
     seed: Annotated[int, Range(0, 2**31)] = 1
     """Number of the surface: the same seed gives the same surface."""
     spectrum_m3: Annotated[float, Range(1e-9, 1e-1)] | None = None
@@ -197,7 +197,7 @@ class Roughness:
     least_1pm: Annotated[float, Range(1e-4, 1.0)] = 0.01
     """Lowest spatial frequency [cycles/m]. Longer waves are left out."""
     greatest_1pm: Annotated[float, Range(0.1, 10.0)] = 4.0
-    """Highest spatial frequency [cycles/m]; the tyre swallows shorter waves."""
+    """Highest spatial frequency [cycles/m]; the tyre absorbs shorter waves."""
 
     def __post_init__(self) -> None:
         """Check that the band of spatial frequencies is not empty."""

@@ -3,7 +3,7 @@
 A road is a plane with a grade and a bank, on which there may be an uneven surface (`surface`). Its friction may differ
 from place to place. Places are given in the world axes of the recording, x along the track from the initial position of
 the centre of gravity, y to the left; or, with `along = "path"`, by the distance along the path of the manoeuvre's
-course and the side of that path. For a wheel, the friction at its contact point counts. While the car settles before
+course and the side of that path. A wheel has the friction at its contact point. While the car settles before
 the recording, it rolls on the plane, only on `mu`.
 """
 
@@ -58,10 +58,10 @@ class RoadPatch:
     """Friction at the end [-], linear from `mu` at the start. Default: `mu` throughout."""
 
     def __post_init__(self) -> None:
-        """Check that the patch ends behind its start."""
+        """Check that the patch ends after its start."""
         if not self.end_m > self.start_m:
             raise ManeuverError(
-                f"the patch ends at {self.end_m:g} m, which is not behind its start_m of {self.start_m:g} m"
+                f"the patch ends at {self.end_m:g} m, which is not after its start_m of {self.start_m:g} m"
             )
 
 
@@ -72,7 +72,7 @@ class BankingTable:
     s_m: tuple[float, ...]
     """Distances along x or along the path [m], increasing."""
     bank_rad: tuple[float, ...]
-    """Bank at these places [rad]. Positive if the left side is higher."""
+    """Bank at these distances [rad]. Positive if the left side is higher."""
 
     def __post_init__(self) -> None:
         """Check the points of the banking."""
@@ -143,7 +143,7 @@ class Road:
     patches: tuple[RoadPatch, ...] = ()
     """Stretches with their own friction. Where two overlap, the later one counts."""
     along: Literal["x", "path"] = "x"
-    """What patches, sides, obstacles and surfaces follow: `x`, the world's x axis, or `path`, the path of the
+    """Line that patches, sides, obstacles and surfaces follow: `x`, the world's x axis, or `path`, the path of the
     manoeuvre's course."""
 
     bank_rad: Annotated[float, Range(-0.5, 0.5)] = 0.0
@@ -165,10 +165,10 @@ class Road:
     banking: BankingTable | None = None
     """Bank over the distance, as for a banked curve. Default: none."""
     contact: Literal["auto", "single_point", "four_point", "enveloping"] = "auto"
-    """What a tyre feels of an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` where all
-    that is uneven is long and smooth, else `enveloping`."""
+    """How a tyre follows an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` if all
+    unevenness is long and smooth, otherwise `enveloping`."""
     start_m: Annotated[float, Range(3.0, 1000.0)] = 10.0
-    """Distance from which an uneven surface or `banking` counts in full [m]. From 2 m on it is blended in."""
+    """Distance from which an uneven surface or `banking` acts fully [m]. It is blended in from 2 m on."""
     outside: Literal["extend", "error"] = "extend"
     """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
@@ -216,7 +216,7 @@ class Road:
         return not all(obstacle.is_smooth for obstacle in self.obstacle)
 
     def laid(self, course: Course | None) -> Road:
-        """Return the road, with the path of the course if the road follows it.
+        """Return the road: with the path of the course if it follows the course, otherwise unchanged.
 
         Raises:
             ManeuverError: the road follows the path, and the manoeuvre has none.

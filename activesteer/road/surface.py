@@ -41,7 +41,7 @@ SINGLE_POINT, FOUR_POINT, ENVELOPING = 1.0, 2.0, 3.0
 COARSE_M: Final = 0.018
 """Distance at which a tyre looks for an obstacle [m]. A cleat of 20 mm cannot hide between two places."""
 NEAR_M: Final = 1.0
-"""Distance within which an obstacle counts for a wheel [m]; a tyre reaches some 0.5 m."""
+"""Distance within which an obstacle affects a wheel [m]; a tyre reaches about 0.5 m."""
 
 
 @compiled

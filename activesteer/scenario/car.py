@@ -389,7 +389,7 @@ def estimator_setup(car: CarSpec) -> EstimatorSetup | None:
 
 
 def _known(parameters: TyreParameters, load_N: float) -> KnownTyre:
-    """Evaluate a tyre with this static load."""
+    """Return a tyre as an estimator knows it, for a static load."""
     tyre = MagicFormula(parameters)
     loads_N, angles_rad = map(np.linspace, (0.0, 0.0), (_LARGEST_LOAD * load_N, _LARGEST_SLIP_ANGLE_RAD), GRID)
     left, right = (

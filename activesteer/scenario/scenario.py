@@ -126,7 +126,7 @@ def resolve(
         overrides: Dotted key -> value, such as `speed_kmh`, `road.mu` or `controllers.ars.limit_deg`. Start the key
             with `maneuver.` or `vehicle.` if both have it, and with `driver.` for keys of the driver. Parameters of
             your own code have keys such as `controllers.YawBeta.k_beta` and `driver.Cautious.preview_s`. The key
-            `driver` replaces the driver, the key `fault` the faults: tables, or texts such as `rear:stuck@2.0`,
+            `driver` replaces the driver, the key `fault` the faults: tables, or strings such as `rear:stuck@2.0`,
             separated by spaces.
         driver: Name, path or table of a driver, or your own code; see `driver_spec`.
         controllers: Controllers whose parameters `overrides` may set, as for `simulate`; needed for your own code only.
@@ -318,7 +318,7 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
     """Change one key of a scenario during a run.
 
     Returns:
-        The block that must be made anew, `controller` or `driver`, or an empty text, and the changed scenario.
+        The block that must be made anew, `controller` or `driver`, or an empty string, and the changed scenario.
     """
     value = plain({key: value})[key]
     owned = own_controllers([controller])
@@ -344,7 +344,7 @@ def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s
         if any(getattr(road, name) != getattr(before.road, name) for name in held) or road == before.road:
             raise _cannot(key, "only the friction of a road can" if road != before.road else "the value is the same")
         if len(road.areas()) != len(before.road.areas()):
-            raise _cannot(key, "the road has no such area; give it at the start, with the friction of the road")
+            raise _cannot(key, "the road has no such area; define it before the run, with the friction of the road")
         return "", replace(scenario, maneuver=_same_course(before, replace(before, road=road)))
     if path[0] in _FIXED:
         raise _cannot(key, "it belongs to the start of the run")

@@ -1,6 +1,6 @@
 """Changes of values in vehicle files.
 
-The module edits lines, because tomlkit puts a new key behind the comment that belongs to the next table.
+The module edits lines, because tomlkit puts a new key after the comment that belongs to the next table.
 """
 
 from __future__ import annotations

@@ -67,11 +67,11 @@ class RateSensor(Sensor):
 class WheelSpeedSensor(RateSensor):
     """A sensor of the rotational speed of a wheel.
 
-    All four are alike.
+    All four sensors are alike.
 
     With teeth, the sensor counts the edges of a pulse wheel that pass between two samples and measures their time. If
     no edge passes, the reading is at most the speed that the time since the last edge allows. The sign of rotation is
-    known, and an edge that passes again in the other direction is no tooth.
+    known, and an edge that passes again in the other direction does not count.
     """
 
     teeth: Annotated[int, Range(0, 1000)] | None = None

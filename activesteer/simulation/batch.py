@@ -306,7 +306,7 @@ class Batch(Copyable):
             cars: Numbers of the cars, or a mask; by default all.
 
         Raises:
-            ParameterError: the text has another form.
+            ParameterError: the text is not such a fault.
             ManeuverError: a car has no such part, the part has a fault at this time, or the time is past.
         """
         with self._in_use:

@@ -85,8 +85,8 @@ class Keys:
     """Keys of the window: space pauses, R restarts, minus and plus halve and double the speed.
 
     Attributes:
-        paused: Whether the drive stands still.
-        restart: Whether the drive shall start anew.
+        paused: Whether the drive is paused.
+        restart: Whether to restart the drive.
         faster: Factor of the speed, to apply before the next frame.
     """
 
@@ -213,7 +213,7 @@ def check_display() -> None:
     if not window:
         # GLFW's messages come as "(number) b'words'".
         reasons = [re.sub(r"^\(\d+\) b'(.*)'$", r"\1", str(warning.message)) for warning in caught]
-        msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW does not say why'}"
+        msg = f"there is no display to open a window on: {reasons[-1] if reasons else 'GLFW gives no reason'}"
         raise PlaybackError(f"{msg}; `activesteer video` makes a film of a recording without a window")
 
 
@@ -246,7 +246,7 @@ def watch(scenario: Any, controller: str, speed: float, *, cutaway: bool) -> Non
 
 @contextmanager
 def _threads_joined() -> Iterator[None]:
-    """Wait for the viewer's thread at the end, to prevent a crash at the shutdown of Python."""
+    """Wait for the viewer's thread at the end, to prevent a crash when Python shuts down."""
     before = set(threading.enumerate())
     try:
         yield

@@ -34,7 +34,7 @@ DONE, NEEDS_BLOCKS, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS = range(5)
 NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(5, 9)
 """Why a car has stopped: all its steps are made. Driver and controller are not in the record. A fault begins or ends.
 The tape has no room. The next setpoints, the driver's gains at a new speed, the driver's or the controller's command
-are needed. A value is beyond all reason."""
+are needed. A value is implausibly large."""
 
 MESSAGES: Final[dict[str, type[Any]]] = {
     "driver_command": DriverCommand, "actuator_command": ActuatorCommand, "measurement": Measurement, "motion": Motion,

@@ -1,9 +1,9 @@
 """Preparation of a scenario: settling, search for a steering amplitude, and store of amplitudes.
 
-A found amplitude is the input for every controller. It is kept under a key of everything that it depends on, in the
-process and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete
-this folder at any time. A file holds the number and a hash of key and number, so a damaged or misplaced file is
-ignored. If the folder cannot be read or written, nothing is stored there.
+A found amplitude is the input for every controller. It is kept under a key of everything that it depends on, in memory
+and in `$XDG_CACHE_HOME/activesteer/amplitudes`, by default `~/.cache/activesteer/amplitudes`. You can delete this
+folder at any time. A file holds the number and a hash of key and number, so a damaged or misplaced file is ignored. If
+the folder cannot be read or written, nothing is stored there.
 
 Mass, yaw inertia and axle distances come from the model at static ride; see `studies.linear.identification`.
 """
@@ -75,7 +75,7 @@ def recall(key: str) -> float | None:
 
 
 def keep(key: str, value: float) -> None:
-    """Store an amplitude in the process and, if allowed, on disk."""
+    """Store an amplitude in memory and, if allowed, on disk."""
     _remember(key, value)
     if not _writes:
         return
@@ -98,7 +98,7 @@ def keep(key: str, value: float) -> None:
 
 @contextlib.contextmanager
 def not_on_disk() -> Iterator[None]:
-    """Context that keeps new amplitudes only in the process, because the cars of a study do not recur."""
+    """Context that keeps new amplitudes only in memory, because the cars of a study do not recur."""
     global _writes  # noqa: PLW0603 - one setting for the process, like the numbers
     before, _writes = _writes, False
     try:
@@ -322,7 +322,7 @@ def with_amplitude_found(
     Args:
         scenario: A scenario.
         timestep_s: Step of the simulation [s].
-        angle_rad: A `searched_angle` from before, which counts in place of a search [rad].
+        angle_rad: An earlier `searched_angle`, which replaces a search [rad].
 
     Returns:
         A scenario whose input is the same for every controller.

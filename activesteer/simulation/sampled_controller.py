@@ -57,7 +57,7 @@ def _with_rates(setup: ControllerSetup, scenario: Scenario, vehicle: Vehicle) ->
 
 
 def slow_actuators(plugin: Plugin, scenario: Scenario, vehicle: Vehicle) -> str:
-    """Describe the actuators that are slower than the controller needs, empty if there are none."""
+    """Return a description of the actuators that are slower than the controller needs, or an empty string."""
     needed = getattr(plugin.origin, "rates_radps", {})
     rates = steering_rates(vehicle.model, scenario.car.config)._asdict() if needed else {}
     return "; ".join(

@@ -304,7 +304,7 @@ class Simulation(Copyable):
             fault: As on the command line: `rear:stuck` from the next step on, or `rear:offset=1deg@2.5-3` later.
 
         Raises:
-            ParameterError: the text has another form.
+            ParameterError: the text is not such a fault.
             ManeuverError: the car has no such part, the part has a fault at this time, or the time is past.
 
         Examples:

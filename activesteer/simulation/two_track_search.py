@@ -2,7 +2,7 @@
 
 The steering wheel turns to one side and then to the other for about 2 m/s2 each. While the car turns steadily, the
 difference between both sides gives load transfer and roll angle over lateral acceleration. Natural frequency and
-damping of the roll are fitted to the whole run, with the roll angle as the answer of a second-order system to the
+damping of the roll are fitted to the whole run, with the roll angle as the response of a second-order system to the
 lateral acceleration.
 
 The same run gives the lateral speed h_i of the wheels per roll rate p'. Their slip angles follow with a lag, the

@@ -54,7 +54,7 @@ class Examination:
 
     @property
     def failed(self) -> list[str]:
-        """Controllers with which the car breaks a limit or cannot be tested."""
+        """Controllers with which the car exceeds a limit or cannot be tested."""
         return [name for name, found in self.findings.items() if found.passed is False or found.error]
 
     def to_json(self) -> dict[str, Any]:

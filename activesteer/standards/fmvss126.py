@@ -47,7 +47,7 @@ def amplitudes(a_deg: float) -> list[tuple[float, float]]:
 
 
 def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
-    """Describe the limits that a run exceeds, empty if it keeps them."""
+    """Return a description of the limits that a run exceeds, empty if there are none."""
     broken = [
         f"yaw rate {100.0 * row[name]:.0f} % {after_s:.2f} s after completion of steer ({100.0 * limit:.0f} % allowed)"
         for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)
@@ -115,7 +115,7 @@ def _reference_angle(runner: StandardRunner) -> tuple[float, dict[str, list[floa
 def _summary(series: list[dict[str, Any]], broken: list[list[str]]) -> str:
     failed = [(row, words) for row, words in zip(series, broken, strict=True) if words]
     if not failed:
-        return f"all {len(series)} runs keep the limits, up to {series[-1]['amplitude_deg']:.0f} deg to both sides"
+        return f"all {len(series)} runs meet the limits, up to {series[-1]['amplitude_deg']:.0f} deg to both sides"
     row, words = min(failed, key=lambda pair: pair[0]["factor"])
     return (
         f"first at {row['factor']:.3g} A ({row['amplitude_deg']:.0f} deg), {row['direction']} first: "

@@ -138,7 +138,7 @@ def _random_responses(runs: list[StandardRun]) -> Responses:
 
 
 def weak_ranges(found: FrequencyResponse) -> str:
-    """Describe the frequency ranges with a coherence below `COHERENCE`, empty if there are none."""
+    """Return a description of the frequency ranges with a coherence below `COHERENCE`, empty if there are none."""
     weak = np.concatenate([[False], found.coherence < COHERENCE, [False]])
     edges = np.flatnonzero(np.diff(weak.astype(int)))
     lines = found.frequency_Hz

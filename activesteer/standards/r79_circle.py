@@ -32,10 +32,10 @@ from activesteer.studies.engine.workers import in_parallel
 
 
 class Effort(NamedTuple):
-    """A row of table 2 for cars (M1)."""
+    """Limit of the steering effort for cars (M1): a row of table 2 of UN R79."""
 
     radius_m: float  # radius to reach [m]
-    limit_N: float  # greatest force at the rim until then [N]
+    limit_N: float  # largest force at the rim until then [N]
     case: Mapping[str, Any]  # condition of the car: dotted key -> value
 
 
@@ -63,7 +63,7 @@ _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "s
 
 
 class Reached(NamedTuple):
-    """Return the time until a radius is reached and the largest rim force until then, or nan if not reached."""
+    """Time until a radius is reached and the largest rim force until then, or nan if not reached."""
 
     time_s: float
     effort_N: float
@@ -162,7 +162,7 @@ def _fault_words(faults: list[dict[str, Any]]) -> str:
         )
     count = len({row["fault"] for row in faults})
     if idle := count - len(_with_effect(faults)):
-        words += f". {idle} of {count} faults change nothing with this controller"
+        words += f". {idle} of {count} faults have no effect with this controller"
     return words + ("" if done == faults else f". {len(faults) - len(done)} of {len(faults)} faults did not finish")
 
 
@@ -438,7 +438,7 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
     """Find the longest duration of a fault within the limits [s], by bisection.
 
-    The search assumes that a longer fault has a larger effect. It returns the bound that keeps the limits.
+    The search assumes that a longer fault has a larger effect. It returns the bound that meets the limits.
     """
     good, bad = 0, round(broken_s / runs.timestep_s)
     while bad - good > max(1.0, _RESOLUTION_S / runs.timestep_s):

@@ -159,12 +159,12 @@ class Findings:
 
     @property
     def passed(self) -> bool | None:
-        """True if the car keeps the limits, or None for a method without limits."""
+        """True if the car meets the limits, or None for a method without limits."""
         return self.values.get("pass")
 
 
 _RATE_DEGPS: Final = 5.0
-"""Rate of the ramp [deg/s]. The car lags by some 0.1 s, which is half a degree."""
+"""Rate of the ramp [deg/s]. The car lags by about 0.1 s, which is half a degree."""
 _LONGEST_S: Final = 30.0
 
 

@@ -105,7 +105,7 @@ def drive(
 ) -> Iterator[tuple[str, str, str]]:
     """Drive all runs, and report each run at its end.
 
-    Yield scenario, system, and the reason why the run ended early or an empty text, as each ends.
+    Yield scenario, system, and the reason why the run ended early or an empty string, as each ends.
 
     A search is made once for all controllers.
     """

@@ -61,9 +61,7 @@ class SingleTrackParameters:
     def __post_init__(self) -> None:
         """Check the source of the parameters."""
         if self.source not in SOURCES:
-            raise ParameterError(
-                f"is {self.source!r}; allowed are {', '.join(SOURCES)}", key="source", value=self.source
-            )
+            raise ParameterError(f"is {self.source!r}; allowed: {', '.join(SOURCES)}", key="source", value=self.source)
 
     @property
     def wheelbase_m(self) -> float:

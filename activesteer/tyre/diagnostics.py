@@ -64,7 +64,7 @@ def _missing(params: TyreParameters) -> Iterator[tuple[str, str]]:
         if key not in params.given and not (params.version == 52 and relaxation.get(key, "") in params.given)
     ]
     if defaults:
-        yield f"not in the file: {', '.join(defaults)}", "these stand-ins are used"
+        yield f"not in the file: {', '.join(defaults)}", "these default values are used"
     unknown = sorted(key for section, key in params.unused if section != "MDI_HEADER" and key not in _BOOKKEEPING)
     if unknown:
         names = ", ".join(unknown)
@@ -106,7 +106,7 @@ def _frame(params: TyreParameters) -> Iterator[tuple[str, str]]:
     if dimensions and abs(built / radius - 1.0) > 0.04:
         yield (
             f"UNLOADED_RADIUS = {radius:g} m, but rim and side wall make {built:.3f} m",
-            "width, aspect ratio and rim do not belong to this radius",
+            "width, aspect ratio and rim do not match this radius",
         )
     if params["VXLOW"] > 3.0 or params["VXLOW"] < 0.1:
         yield f"VXLOW = {params['VXLOW']:g} m/s", "shifts and trail fade out below it; 1 to 2 m/s is usual"
@@ -153,7 +153,7 @@ def _levels(params: TyreParameters) -> Iterator[tuple[str, str]]:
             )
     cornering = -float(at.cornering_stiffness_Nprad) / nominal
     if cornering <= 0.0:
-        yield f"cornering stiffness over load is {cornering:.1f} 1/rad", "the side force would drive the tyre aside"
+        yield f"cornering stiffness over load is {cornering:.1f} 1/rad", "the side force would push the tyre sideways"
     elif not CORNERING_RANGE_PRAD[0] <= cornering <= CORNERING_RANGE_PRAD[1]:
         low, high = CORNERING_RANGE_PRAD
         yield f"cornering stiffness over load is {cornering:.1f} 1/rad", f"{low:g} to {high:g} 1/rad are usual"
@@ -171,7 +171,7 @@ def _levels(params: TyreParameters) -> Iterator[tuple[str, str]]:
     for name, values in (("mu_x", over.friction_x), ("mu_y", over.friction_y)):
         wrong = loads[np.sign(values) != np.sign(values[np.abs(loads - nominal).argmin()])]
         if wrong.size:
-            yield f"{name} changes its sign at {wrong[0]:.0f} N", "the load terms run away inside the range of validity"
+            yield f"{name} changes its sign at {wrong[0]:.0f} N", "the load terms diverge inside the range of validity"
 
 
 def _curvatures(params: TyreParameters) -> Iterator[tuple[str, str]]:
@@ -191,7 +191,7 @@ def _curvatures(params: TyreParameters) -> Iterator[tuple[str, str]]:
         if above.size:
             yield (
                 f"{name} exceeds 1 between {above[0]:.0f} and {above[-1]:.0f} N",
-                "the curve would turn back on itself; E is held at 1, as the formula asks",
+                "the curve would turn back on itself; E is held at 1, as the formula requires",
             )
 
 
@@ -211,5 +211,5 @@ def _asymmetry(params: TyreParameters) -> Iterator[tuple[str, str]]:
     if left and right and abs(left / right - 1.0) > 0.05:
         yield (
             f"the peak side force differs by {100 * abs(left / right - 1.0):.0f} % between left and right",
-            "built-in asymmetry, or a measurement whose shifts were not taken out",
+            "built-in asymmetry, or a measurement whose shifts were not removed",
         )

@@ -242,7 +242,7 @@ def _longitudinal_force(formula: MagicFormula) -> Picture:
 
 
 def envelope(formula: MagicFormula, load_N: float, directions: int = _DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the greatest horizontal force of a tyre in each direction."""
+    """Return the largest horizontal force of a tyre in each direction."""
     params = formula.parameters
     # Closer together near zero, where the forces change fastest.
     fraction = np.linspace(-1.0, 1.0, _GRID)
@@ -272,7 +272,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
         "side force over load $F_y / F_z$, to the left positive", "longitudinal force over load $F_x / F_z$", curves,
         x_range=(limit, -limit), y_range=(-limit, limit), zero=True, equal=True, legend="load",
     )  # fmt: skip
-    return Picture("greatest forces at combined slip, over the load", [panel], width_in=6.5, height_in=6.5)
+    return Picture("largest forces at combined slip, over the load", [panel], width_in=6.5, height_in=6.5)
 
 
 def _combined_slip(formula: MagicFormula) -> Picture:

@@ -52,7 +52,7 @@ class TyreConventions:
     """Point whose lateral velocity is the slip: `contact_point` (with a part from the camber rate) or `wheel_centre`.
     """
     rolling_radius: Literal["file", "third_of_deflection"] = "file"
-    """Effective rolling radius. `file`: from BREFF, DREFF, FREFF. `third_of_deflection`: R_0 less a third of the
+    """Effective rolling radius. `file`: from BREFF, DREFF, FREFF. `third_of_deflection`: R_0 minus a third of the
     deflection."""
     trail_load: Literal["nominal", "scaled"] = "nominal"
     """Reference load of the pneumatic trail. `nominal`: FNOMIN. `scaled`: LFZO FNOMIN."""
@@ -80,7 +80,7 @@ class TyreConventions:
 _MAX_FORCE: Final = 1e12
 """No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
 _ENORMOUS: Final = 1e7
-"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are some 1e6."""
+"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are about 1e6."""
 _TURN_SLIP_1PM: Final = 0.1
 _MF52: Final = 52.0
 
@@ -263,7 +263,7 @@ class TyreParameters(Mapping[str, float]):
     def mounted_on(self, side: Side) -> TyreParameters:
         """Return the tyre for a side of the vehicle, mirrored if its coefficients belong to the other side."""
         if side not in ("LEFT", "RIGHT"):
-            raise ParameterError(f"is {side!r}; allowed are 'LEFT' and 'RIGHT'", key="side", value=side)
+            raise ParameterError(f"is {side!r}; allowed: 'LEFT' and 'RIGHT'", key="side", value=side)
         return replace(self, mounted=side)
 
     def with_values(self, **changes: float) -> TyreParameters:
@@ -315,7 +315,7 @@ def _resolve(given: Mapping[str, float], source: str) -> dict[str, float]:
         raise ParameterError(f"missing; a tyre needs {needed}", file=source, key=", ".join(missing))
     values = {each.name: float(given.get(each.name, each.default or 0.0)) for each in COEFFICIENTS}
     if values["FITTYP"] not in _MF_VERSIONS:
-        raise fail("FITTYP", values["FITTYP"], f"allowed are {', '.join(str(version) for version in _MF_VERSIONS)}")
+        raise fail("FITTYP", values["FITTYP"], f"allowed: {', '.join(str(version) for version in _MF_VERSIONS)}")
     _fill(values, given, source)
     for key in _POSITIVE:
         if not (value := values[key]) > 0.0:

@@ -200,7 +200,7 @@ class Vehicle(Uncopyable):
     def rebase(self) -> None:
         """Set the current position and heading as the origin of the road, and the current time as time 0.
 
-        The motion continues unchanged. From here on the friction of the road's areas counts; before, the road's `mu`.
+        The motion continues unchanged. From here on the friction of the road's areas applies; before, the road's `mu`.
         """
         data = self.data
         # After a step the positions are those of its start, the state is that of its end.
@@ -228,8 +228,8 @@ class Vehicle(Uncopyable):
             Measurement and motion after the step; see `measure` and `motion`.
 
         Raises:
-            ParameterError: a command is not exactly such a message, or holds something that is not a number.
-            SimulationDiverged: the engine warns, or a recorded value is not finite or beyond all reason.
+            ParameterError: a command is not exactly such a message, or contains a value that is not a number.
+            SimulationDiverged: the engine warns, or a recorded value is not finite or implausibly large.
         """
         write_commands(self.rows.commands, driver_command, actuator_command)
         if actuator_command.estimate is not None:
@@ -360,7 +360,7 @@ class Vehicle(Uncopyable):
         """Record the controller's estimate from now on.
 
         Args:
-            estimate: The present estimate.
+            estimate: The current estimate.
 
         Raises:
             ParameterError: `estimate` is not an `Estimate` of numbers.
@@ -459,7 +459,7 @@ class Vehicle(Uncopyable):
         """Insert fault-capable ideal sensors between the true motion and the brakes, or remove them.
 
         Args:
-            wanted: Whether to insert the sensors; no effect on a car with sensors of its own.
+            wanted: Whether to insert the sensors; no effect on a car that already has sensors.
         """
         if self.parameters.sensors.is_ideal and wanted is (self.sensors is None):
             self.sensors = SensorBlock(self.parameters.sensors, float(self.model.opt.timestep)) if wanted else None

@@ -409,7 +409,7 @@ class SuperpositionActuator(ElectricActuator):
     lock_torque_Nm: Annotated[float, Range(0.0, 50.0)] | None = None
     """Holding torque of the electromagnetic lock at the motor without supply [N m]."""
     position_tolerance_rad: Annotated[float, Range(0.0, 0.1)] | None = None
-    """Error of the angle behind the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
+    """Error of the angle after the gear at which the motor is switched off, if the gear then holds by itself [rad]."""
 
 
 def fit_motor(spec: mujoco.MjSpec) -> None:

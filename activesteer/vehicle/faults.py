@@ -40,7 +40,7 @@ class Faults:
             else:
                 members = ACTUATORS[fault.part].members
                 if fault.part in ("rear_left", "rear_right") and vehicle.parameters.rear_actuator.is_central:
-                    problem = "is no part of this car, whose rear_actuator.arrangement is 'central'; rear is"
+                    problem = "is not a part of this car, whose rear_actuator.arrangement is 'central'; rear is"
                     raise ManeuverError(f"{fault.part!r} {problem}", key="part", value=fault.part, allowed=["rear"])
                 kind = _MotorFault if fault.part.startswith(MOTOR) else _ActuatorFault
                 self._acting += [kind(fault, name, vehicle) for name in members]
@@ -219,7 +219,7 @@ class _MotorFault(_DemandFault):
         places = [place for place, _ in vehicle.parameters.motors]
         if (place := name.removeprefix(MOTOR)) not in places:
             motors = [MOTOR + each for each in places]
-            problem = f"is no part of this car, which has {', '.join(motors) or 'no electric motor ([motors])'}"
+            problem = f"is not a part of this car, which has {', '.join(motors) or 'no electric motor ([motors])'}"
             raise ManeuverError(f"{name!r} {problem}", key="part", value=fault.part, allowed=motors)
         super().__init__(fault, vehicle.timestep_s)
         number = places.index(place)

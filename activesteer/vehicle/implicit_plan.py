@@ -1,6 +1,7 @@
 """Plan of the implicit solution, and detection of changes in the engine's data.
 
-All features of MuJoCo 4.0's models, and who computes a step that has them. "Engine" is the engine's own `mj_step`.
+All features of MuJoCo 4.0's models, and which solution computes a step that has them. "Engine" is the engine's own
+`mj_step`.
 
 | Feature | Step |
 | --- | --- |
@@ -280,7 +281,7 @@ class ImplicitPlan:
     def follow(self) -> None:
         """Plan again if the data behind the plan have changed.
 
-        This takes two microseconds if nothing has changed. All other changes count in each step anyway.
+        This takes two microseconds if nothing has changed. All other changes take effect in each step anyway.
         """
         state = watch(*self._watch)
         if state == UNCHANGED and self._current_settings() == self._settings:

@@ -12,8 +12,8 @@ distribution with the standard deviation s, and a slow motion of speed v,
     mean of sign(v + vibration) = erf(v / (sqrt(2) s))
 
 which at small speeds is a damper of sqrt(2/pi) F / s. (Control engineers know it as dither.) The road of this package
-is perfectly even; without this mean its cars would ride on stuck dampers up to 0.1 g. So w_slip is multiplied by the
-mean: friction is dry at rest and while the damper moves faster than the vibration, and smooth below.
+is perfectly even; without this mean its cars would ride on stuck dampers up to 0.1 g. Therefore w_slip is multiplied by
+the mean: friction is dry at rest and while the damper moves faster than the vibration, and smooth below.
 
 Roughness: the velocity spectrum of a road is white and grows with the driving speed (ISO 8608), so s grows with the
 root of that speed.
@@ -98,7 +98,7 @@ def _motor_load(links, screw, act, ten_length):
 
 @inlined
 def _motor_limits(screw, speed):
-    """Return the limits of the torque by current, voltage and power at a speed [N m]."""
+    """Return the torque limits set by current, voltage and power at a speed [N m]."""
     high = min(screw.peak_Nm, max(screw.stall_Nm - screw.slope_Nmsprad * speed, 0.0))
     low = -min(screw.peak_Nm, max(screw.stall_Nm + screw.slope_Nmsprad * speed, 0.0))
     if speed > 0.0:

@@ -1,6 +1,7 @@
 """Contact of a wheel with an uneven road, reduced to an effective plane.
 
-The tyre's formula needs a plane. Three ways lead to it, from the place straight below the lowest point of the wheel:
+The tyre's formula needs a plane. There are three ways to find it, from the point straight below the lowest point of the
+wheel:
 
 * `SINGLE_POINT`: tangent plane of the road at that place.
 * `FOUR_POINT`: plane through the middles of four points, `FOUR_POINT_AHEAD` of the free radius ahead and behind, and
@@ -17,7 +18,7 @@ Range: the parameters (1.471, 0.9622, 1.5174, 0.8335) are those of the tyre file
 whose `ELLIPS_MAX_STEP` is 25 mm. The belt's own vibration is not modelled. The distance of the cams does not follow the
 load.
 
-Sources, which were not at hand when this was written: Schmeitz, A semi-empirical three-dimensional model of the
+Sources, which were not available when this was written: Schmeitz, A semi-empirical three-dimensional model of the
 pneumatic tyre rolling over arbitrarily uneven road surfaces, TU Delft 2004; Pacejka, Tire and Vehicle Dynamics, 3rd ed.
 2012.
 """

@@ -218,8 +218,8 @@ def carry_out(bindings_address, commands_address, torques_set, measurement_addre
     """Carry out the commands, advance the engine by one step, record it and read the sensors.
 
     The numbers of the commands (`COMMAND_ROW`) are copied into the first recorded array after the engine's; those of
-    measurement and motion are written. The step is recorded on the tape of the bindings, unless the state is not sane.
-    Returns whether it is.
+    measurement and motion are written. The step is recorded on the tape of the bindings, unless the state is invalid.
+    Returns whether it is valid.
     """
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
     row_address = bindings.sources[_ENGINE_ARRAYS]

@@ -335,7 +335,7 @@ class VehicleParameters:
 
     @property
     def engine_share(self) -> float:
-        """Fraction of the driver's demand that the engine provides [-], not the motors."""
+        """Fraction of the driver's demand that the engine, not the motors, provides [-]."""
         front = self.powertrain.front_fraction
         return 1.0 - sum(part for axle, part in (("front", front), ("rear", 1.0 - front)) if self.motors.on(axle))
 

@@ -81,7 +81,7 @@ class Tape:
     """
 
     def __init__(self) -> None:
-        """Create a tape without capacity."""
+        """Create an empty tape."""
         self.record = np.zeros(1, TAPE)
         self.address = self.record.ctypes.data
         self.memory: Any = None
@@ -319,8 +319,8 @@ class WheelSet:
         for corner, torque in zip(CORNERS, torques_Nm, strict=True):
             if torque != 0.0 and corner not in self._driven:
                 raise ParameterError(
-                    f"demands {torque:g} N m at {corner}, a wheel without a drive; driven are {', '.join(self._driven)}"
-                    "; [motors] in the vehicle file can drive any wheel",
+                    f"demands {torque:g} N m at {corner}, a wheel without a drive; the driven wheels are "
+                    f"{', '.join(self._driven)}; [motors] in the vehicle file can drive any wheel",
                     key="wheel_torque_demand_Nm",
                     value=torque,
                 )

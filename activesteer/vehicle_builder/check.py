@@ -300,7 +300,7 @@ def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
         for rod in rods
         if abs(rod.end_m[1] - rod.start_m[1]) > abs(rod.end_m[0] - rod.start_m[0]) and rod.end_m[1] < rod.start_m[1]
     ]
-    yield _any("inner ends further in than outer ends", crossed, "its inner and outer point seem to be exchanged")
+    yield _any("inner ends further in than outer ends", crossed, "its inner and outer point seem to be swapped")
     upside = []
     for corner in ("fl", "rl"):
         for pair in (("uca", "lca"), ("trailing_upper", "trailing_lower"), ("camber_link", "spring_link")):
@@ -310,7 +310,7 @@ def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
             )
             if above and below and max(above) <= min(below):
                 upside.append(f"{corner}_{pair[0]} below {corner}_{pair[1]}")
-    yield _any("upper links above lower links", upside, "exchange them, or check z of their outer points")
+    yield _any("upper links above lower links", upside, "swap them, or check z of their outer points")
 
 
 def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
@@ -325,7 +325,7 @@ def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
                 crossing.append(f"{one.name} and {two.name} ({1e3 * gap:.1f} mm)")
     level: Level = "warning" if crossing else "ok"
     words = "yes: " + ", ".join(crossing) if crossing else "no"
-    advice = "two rods cannot pass through each other; is a point exchanged?" if crossing else ""
+    advice = "two rods cannot pass through each other; are two points swapped?" if crossing else ""
     yield Finding("geometry", "links that cross", level, words, "", advice)
 
 
@@ -347,7 +347,7 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
                 far.append(f"{name} ({np.abs(point - centre).max():.2f} m)")
             elif point[1] > centre[1] + 0.05:
                 outside.append(f"{name} ({1e3 * (point[1] - centre[1]):.0f} mm)")
-    yield _any("points within 1.2 m of their wheel", far, "front and rear exchanged, or a point in another unit?")
+    yield _any("points within 1.2 m of their wheel", far, "front and rear swapped, or a point in another unit?")
     advice = "check y: the point is further out than the middle of the tyre"
     yield _any("points not outside the middle of the wheel", outside, advice)
 

@@ -140,7 +140,7 @@ def complete(
     log: Log,
     tables: KcTables | None = None,
 ) -> CarDesign:
-    """Complete a car from its table."""
+    """Return the complete car of a table, with rules for the missing values."""
     steering, brakes = table.steering, table.brakes
     column_Npm = log.take("steering", steering, "column_stiffness_Npm", 4e6, "the compact's: torsion bar and assist")
     servo_Nmprad = table.rear_steering.stiffness_Nmprad or _SERVO_NMPRAD
@@ -172,7 +172,7 @@ def complete(
         table,
         front,
         rear,
-        log.take("", table, "width_m", round(float(track) + 0.27, 2), "greatest track + 0.27 m"),
+        log.take("", table, "width_m", round(float(track) + 0.27, 2), "largest track + 0.27 m"),
         log.take("steering", steering, "rack_mass_kg", 3.0, "rack bar and half of the tie rods"),
         log.take("steering", steering, "rack_limit_m", rack_limit_m(front), "36 deg of steer angle"),
         log.take("steering", steering, "rack_friction_N", 150.0, "the compact's, electric assist"),

@@ -59,7 +59,7 @@ def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float],
     rise = float(along[2, dofs] @ direction)
     if abs(rise) < 0.05 * float(np.linalg.norm(along[:, dofs] @ direction)):
         raise ModelError(
-            "the links let the wheel move, but not up and down; are two of their points exchanged?", key=corner
+            "the links let the wheel move, but not up and down; are two of their points swapped?", key=corner
         )
     return {name: -float(row @ direction) / rise for name, row in rows.items()}, float(values[-1])
 

@@ -100,7 +100,7 @@ def fitted(loads: list[Load]) -> tuple[dict[str, tuple[float, ...]], str]:
         "hardening": tuple(float(f"{value:.6g}") for value in springs.ravel()) if hardens else (),
         "hardening_square": tuple(float(f"{value:.6g}") for value in square),
     }
-    return elastic, f"measured: {names}; not loaded in a test: as usual" if names else "not measured: usual values"
+    return elastic, f"measured: {names}; usual values for other loads" if names else "not measured: usual values"
 
 
 def _start(forces: Array, wanted: Array, weight: Array) -> Array:

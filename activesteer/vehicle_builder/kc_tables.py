@@ -226,7 +226,7 @@ def _channel(file: Path, head: str, name: str) -> tuple[str, float]:
     if found is None or not alike(found, find_unit(unit)):
         known = [name for name in UNIT_NAMES if alike(find_unit(name), find_unit(unit))]
         raise ParameterError(
-            f"{match['unit']!r} is not a unit of {bare}; known are {', '.join(known)}", file=file.name, key=head
+            f"{match['unit']!r} is not a unit of {bare}; known: {', '.join(known)}", file=file.name, key=head
         )
     return channel, found.factor
 

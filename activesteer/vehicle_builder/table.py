@@ -181,7 +181,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class RearSteeringTable:
-    """Hinge between rear knuckle and carrier, required also in a car without rear steering."""
+    """Hinge between rear knuckle and carrier, required even in a car without rear steering."""
 
     axis_lower: Point | None = None
     """A point of the steering axis on the left side, in the table's units."""

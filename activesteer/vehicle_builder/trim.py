@@ -270,7 +270,7 @@ def trim(car: CarDesign, write: Write, log: Log) -> Trimmed:
             if not 0.15 < ratio < 1.6:
                 raise ModelError(
                     f"the {part} shortens by {ratio:.2f} of the wheel's travel in bump; 0.15 to 1.6 are possible in a "
-                    f"car. Are {part}_inner (chassis) and {part}_outer (suspension) exchanged, or is {part}_on wrong?",
+                    f"car. Are {part}_inner (chassis) and {part}_outer (suspension) swapped, or is {part}_on wrong?",
                     key=axle.name,
                 )
         unsprung = float(model.body_subtreemass[model.body(f"{axle.corner}_knuckle").id])

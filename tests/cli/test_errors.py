@@ -36,7 +36,7 @@ def refused(told, *texts: str) -> None:
         (["step_steer", "--vehicle", "compct"], ["no vehicle is named 'compct'", "did you mean 'compact'"]),
         (["step_steer", "--set", "road.mue=1"], ["override road.mue", "did you mean 'road.mu'"]),
         (["step_steer", "--set", "road.mu=wet"], ["override road.mu: 'wet' is not a number"]),
-        (["step_steer", "--set", "speed_kmh=999"], ["override speed_kmh: 999 is out of range; allowed is -72 to 360"]),
+        (["step_steer", "--set", "speed_kmh=999"], ["override speed_kmh: 999 is out of range; allowed: -72 to 360"]),
         (["step_steer", "--set", "road.mu"], ["--set road.mu: KEY=VALUE is needed"]),
         (["step_steer", "--set", "=3"], ["--set =3: KEY=VALUE is needed"]),
         (["step_steer", "--set", "road.mu=" + "[" * 3000], ["nested too deeply"]),

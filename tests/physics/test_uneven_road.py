@@ -132,7 +132,7 @@ def test_linear_analyses_refuse_an_uneven_or_banked_road() -> None:
     [
         ({"contact": "single_point"}, "no effect on a road without such a surface"),
         ({"obstacle": [{"kind": "cleat", "start_m": 6.0, "height_m": 0.01}]}, "a cleat needs it"),
-        ({"obstacle": [{"kind": "bump", "start_m": 6.0}]}, "allowed are 'cosine_bump'"),
+        ({"obstacle": [{"kind": "bump", "start_m": 6.0}]}, "allowed: 'cosine_bump'"),
         ({"obstacle": [{"kind": "cosine_bump", "start_m": 1.0, "length_m": 1.0, "height_m": 0.1}]}, "at least 2"),
         ({"obstacle": [{"kind": "kerb", "start_m": 6.0, "height_m": 0.1, "waves": 3}]}, "no effect on this kerb"),
         ({"banking": {"s_m": [0.0, 10.0], "bank_deg": [0.0]}}, "bank_deg: has 1 values, but s_m has 2"),

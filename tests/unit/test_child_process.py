@@ -69,13 +69,13 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize(
     ("word", "said"),
     [
-        ("crash", "crashed in a test: its process ended with SIGSEGV"),
-        ("exit", "crashed in a test: its process ended with exit code 3"),
-        ("raise", "crashed in a test: its process ended with exit code 1"),
+        ("crash", "crashed during a test: its process ended with SIGSEGV"),
+        ("exit", "crashed during a test: its process ended with exit code 3"),
+        ("raise", "crashed during a test: its process ended with exit code 1"),
         ("hang", "hangs: a test took longer than 0.2 s"),
         ("part", "hangs: a test took longer than 0.2 s"),
         ("drip", "hangs: a test took longer than 0.2 s"),
-        ("close", "closed its connection in a test"),
+        ("close", "closed its connection during a test"),
         ("long", f"answers with {2**62} bytes; at most 100 are allowed"),
     ],
 )

@@ -115,7 +115,7 @@ def test_value_out_of_range_is_answered_in_its_own_unit(keys, key, value, allowe
     with pytest.raises(ParameterError) as told:
         car(**keys)
     assert (told.value.key, told.value.value, str(told.value.allowed)) == (key, value, allowed)
-    assert str(told.value).endswith(f"{key}: {value} is out of range; allowed is {allowed}")
+    assert str(told.value).endswith(f"{key}: {value} is out of range; allowed: {allowed}")
 
 
 @pytest.mark.parametrize("key", ["yaw_rate_radps", "yaw_rate_degps", "limit_deg", "curve"])

@@ -56,7 +56,7 @@ def test_short_value_is_shown_as_python_writes_it():
 def test_five_names_are_offered_at_most():
     names = [f"speed_{number}_mps" for number in range(50)]
     assert nearest_names("speed_mps", names).count("speed_") == 5
-    assert nearest_names("zzz", names) == f"known are: {', '.join(sorted(names)[:5])} and 45 more"
-    assert nearest_names("zzz", ["a", "b"]) == "known are: a, b"
-    assert nearest_names("zzz", []) == "known are: none"
+    assert nearest_names("zzz", names) == f"known names: {', '.join(sorted(names)[:5])} and 45 more"
+    assert nearest_names("zzz", ["a", "b"]) == "known names: a, b"
+    assert nearest_names("zzz", []) == "known names: none"
     assert len(nearest_names("x" * 10_000_000, names)) < MAX_SHOWN

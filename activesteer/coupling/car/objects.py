@@ -4,8 +4,8 @@ The code comes from the same kernels as the code of a simulation, so both are bi
 numba keeps the compiled module in a private interface (`_library`), which may change with a new version.
 
 The native step finds everything by addresses in its records. Here each address becomes a `Relocation`: the place of the
-word, and what it points to. A word that looks like an address but points to nothing known is an error, so that a new
-array of the native step cannot be forgotten.
+word, and what it points to. A word that looks like an address but points to nothing known raises an error, so that a
+new array of the native step cannot be forgotten.
 """
 
 from __future__ import annotations

@@ -301,7 +301,7 @@ class IsolatedInstance:
 
     def _nonsense(self, doing: str, answer: bytes) -> FmuFault:
         self._child.close()
-        return FmuFault(f"returns invalid data in {doing}: {answer[:_MAX_DIGITS]!r}")
+        return FmuFault(f"returns invalid data during {doing}: {answer[:_MAX_DIGITS]!r}")
 
     def _ask(self, request: bytes, doing: str = "a call", most_bytes: int = 0, limit_s: float | None = None) -> bytes:
         try:

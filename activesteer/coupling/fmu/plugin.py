@@ -53,7 +53,7 @@ class Signals(NamedTuple):
     """Signals of messages, by name."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
-    others: frozenset[str]  # names of fields that are no numbers
+    others: frozenset[str]  # names of fields that are not numbers
     words: str  # the messages, in words
 
     def full(self, name: str) -> str | None:
@@ -279,7 +279,7 @@ class FmuBlock:
         return _revived, (self._fmu, self._setup, self._parameters, content, self._held, self._steps)
 
     def _call(self, use: Callable[[_Shared], Any]) -> Any:
-        """Use the instance in the state of this block."""
+        """Call a function with the shared instance, set to the state of this block."""
         if not self._fmu.description.saves_state:
             raise self._stateless("save its state (canGetAndSetFMUstate)")
         try:

@@ -124,7 +124,7 @@ def _metric_row(entry: KcMetric) -> list[Text]:
 
 
 def rear_camber_figure(result: KcResult) -> Figure:
-    """Draw figure 1 of the paper: rear camber against wheel travel and against side force.
+    """Draw figure 1 of the paper: rear camber versus wheel travel and versus side force.
 
     Source: V. Dorsch, Mecatronics-REM 2012, figure 1.
     """
@@ -258,7 +258,7 @@ def _steering(result: KcResult) -> Picture:
     panels = [
         Panel("steering wheel [deg] (+ left)", "steer angle [deg]", angles, zero=True),
         Panel("mean steer angle [deg]", "overall steering ratio", ratio, zero=True),
-        Panel("inner wheel [deg]", "inner less outer [deg]", ackermann, zero=True),
+        Panel("inner wheel [deg]", "inner minus outer [deg]", ackermann, zero=True),
         Panel("steering wheel [deg]", "mean steer angle [deg]", parking, zero=True),
     ]
     return Picture("steering", panels, width_in=8.5, height_in=6.5)
@@ -309,7 +309,7 @@ def _targets(result: KcResult) -> Picture:
         )
         for number, entry in enumerate(rows)
     ]  # fmt: skip
-    x_label = "place in the target band: 0 lowest, 1 highest"
+    x_label = "position in the target band: 0 lowest, 1 highest"
     band = Area([0.0, 1.0], -0.9, len(rows) - 0.3, "", "#d5ead9")
     names = [_row_name(entry, told=False) for entry in rows]
     notes = [(places[number], float(number), three_digits(entry.value)) for number, entry in enumerate(rows)]

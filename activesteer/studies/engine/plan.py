@@ -111,7 +111,7 @@ def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> 
 
 
 def _labelled(study: StudyFile, key: str) -> Any:
-    """Return each item with a name without folders, so that results are equal on every machine."""
+    """Label each item with its name without folders, so that results are equal on every machine."""
     items = getattr(study, key)
     labels = [label_of(item) for item in items]
     for label in labels:

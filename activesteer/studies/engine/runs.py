@@ -176,7 +176,7 @@ def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[s
 
 
 def differences(settings: Settings) -> str:
-    """Describe the differences from the start of the study, empty if there are none."""
+    """Return a description of the changes since the start of the study, empty if there are none."""
     try:
         here = present_inputs(settings)
     except ActiveSteerError as error:

@@ -31,7 +31,7 @@ from activesteer.studies.engine.runs import CURVE, Row, versions
 IDENTITY: Final = ("run", "run_id", "sample", "maneuver", "vehicle", "controller")
 """Columns that identify the run of a row. The factors follow them."""
 OUTCOME: Final = ("status", "error")
-"""Columns behind the factors. The metrics follow them."""
+"""Columns after the factors. The metrics follow them."""
 _TYPES: Final = {"run": pa.int64(), "sample": pa.int64()} | dict.fromkeys(
     ("run_id", "maneuver", "vehicle", "controller", "status", "error"), pa.string()
 )

@@ -46,9 +46,9 @@ class TuneTable:
     """The table [tune] of a study file."""
 
     minimise: dict[str, str] = field(default_factory=dict)
-    """Name -> expression that shall be small. For several, the Pareto front is found."""
+    """Name -> expression to be minimised. For several, the Pareto front is found."""
     satisfy: dict[str, str] = field(default_factory=dict)
-    """Name -> requirement. As many as possible shall hold."""
+    """Name -> requirement. The search satisfies as many as possible."""
     violate: str = ""
     """Requirement whose worst case is searched. `controller` stands for the examined controller."""
     constraints: dict[str, str] = field(default_factory=dict)
@@ -97,7 +97,7 @@ def read_table(study: StudyFile) -> TuneTable:
             if key not in factors:
                 raise source.fail(place, nearest_names(key, factors), key)
             if not _is_in(factors[key], value):
-                problem = f"{shown(value)} is outside of the factor; allowed are {shown(factors[key].extremes)}"
+                problem = f"{shown(value)} is outside the range of the factor; allowed: {shown(factors[key].extremes)}"
                 raise source.fail(place, problem, value)
     return table
 

@@ -1,7 +1,7 @@
 """Searches over the factors of a study with Optuna, resumable and on several workers.
 
 `tune_table` describes the goals. A requirement to violate is searched for each controller in each manoeuvre. A
-violation is a proof; the absence of one is none.
+violation disproves the requirement; a search without a violation proves nothing.
 """
 
 from __future__ import annotations
@@ -140,10 +140,10 @@ def tune(
 
     Every set is driven in all manoeuvres with all controllers.
 
-    There is one search, or one for each controller in each manoeuvre if a requirement shall be violated; `controllers`
-    and `maneuvers` choose them, by default as in the file. Each then has a folder below the output. A search found
-    in its folder is resumed, up to `trials` sets in total, or as many as `runs` allows; by default as in the file.
-    See `study` for the other arguments.
+    There is one search, or one for each controller in each manoeuvre if the goal is to violate a requirement;
+    `controllers` and `maneuvers` choose them, by default as in the file. Each then has a folder below the output. A
+    search found in its folder is resumed, up to `trials` sets in total, or as many as `runs` allows; by default as in
+    the file. See `study` for the other arguments.
     """
     folder = make_folder(output, StudyError)
     if (folder / "study.toml").exists():

@@ -1,7 +1,7 @@
 """Workers for tasks, with one interface: this process, processes of this machine, or a Dask cluster.
 
 `TaskQueue` distributes tasks and returns their results as they arrive. If a worker dies, only its own tasks are lost
-and repeated. A task that kills its worker every time is given up.
+and repeated. A task that kills its worker every time is abandoned.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Workers:
 
 
 class LocalProcesses(Workers):
-    """Pool of new processes that share nothing with this one, because MuJoCo's callbacks belong to a process."""
+    """Pool of new processes that share nothing with this one, because MuJoCo has one set of callbacks per process."""
 
     def __init__(self, count: int) -> None:
         """Prepare the pool. Its processes start as tasks arrive."""
@@ -289,7 +289,7 @@ _engine: Final = threading.RLock()
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one
-    """Death of the worker of a task at every attempt."""
+    """Error for a task whose worker died at every attempt."""
 
 
 class Outcome(NamedTuple):

@@ -74,7 +74,7 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 
     They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
     all decrements are alike; the friction of the rack makes those of small amplitudes smaller. The damping ratio is 1
-    if the car does not cross the path, also if it stops short of the path.
+    if the car does not cross the path, even if it stops short of the path.
     """
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
@@ -101,9 +101,9 @@ def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
 """Default speeds [km/h]."""
 LEAST_DAMPING: Final = 0.25
-"""Least damping ratio that is asked of a loop."""
+"""Smallest damping ratio that is required of a loop."""
 DAMPED_KMH: Final = 80.0, 100.0
-"""Least and greatest speed at which it is asked [km/h]."""
+"""Lowest and highest speed at which it is required [km/h]."""
 LEAST_PHASE_MARGIN_DEG: Final = 30.0
 """Least phase margin of humans, as McRuer and Krendel measured it [deg]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
@@ -413,7 +413,7 @@ def driver_loops_picture(loops: Sequence[LoopAtSpeed], rows: Sequence[Mapping[st
         Panel(below, "phase [deg]", phase, f"Bode diagram {at}", log="x", x_range=x_range, y_range=(-360.0, -90.0)),
         Panel(after, "lateral position [m],\ndotted: linear loop", step, f"Step of the path {at}"),
         Panel(
-            "speed [km/h]", f"damping of the linear loop [-],\ndashed: least asked{dots}", damping,
+            "speed [km/h]", f"damping of the linear loop [-],\ndashed: required{dots}", damping,
             "Damping over speed", y_range=(lowest, 1.1), legend=None,
         ),
     ]  # fmt: skip

@@ -294,7 +294,7 @@ def linear_car(
     speed_mps = float(speed_mps)
     if not MIN_SPEED_MPS <= speed_mps < math.inf:
         raise ParameterError(
-            f"is {speed_mps:g} m/s; needed are {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) at least",
+            f"is {speed_mps:g} m/s; at least {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) is needed",
             key="speed_mps",
             value=speed_mps,
             allowed=Range(MIN_SPEED_MPS),

@@ -69,7 +69,7 @@ suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
 ASKED_DISK: Final = 0.5
-"""Least disk margin that is asked of a loop: 4.4 dB together with 28 deg [-]."""
+"""Smallest disk margin that is required of a loop: 4.4 dB together with 28 deg [-]."""
 BOTH: Final = "both"
 """Name of the loop in which gain, phase or delay change by the same in both demands."""
 
@@ -356,8 +356,8 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
     title = f"Stability margins: {vehicle}"
     least = min(found, key=lambda each: each.margins.disk)
     value = (passed if least.margins.disk >= ASKED_DISK else failed)(f"{least.margins.disk:.2f}")
-    where = f" with {_name(least)}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is"
-    lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " asked: 4.4 dB together with 28 deg."]
+    where = f" with {_name(least)}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is required:"
+    lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " 4.4 dB together with 28 deg."]
     if drawn:
         lead.append(_LEAD)
     return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")

@@ -1,6 +1,6 @@
 """Read and write .tir files.
 
-Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file ends in a `TyreFileError`
+Nothing in a file is executed, and no memory is allocated by what a file claims. A bad file raises a `TyreFileError`
 that names the file, the line, the key, the value and the allowed range.
 """
 
@@ -123,7 +123,7 @@ def _units(entries: tuple[Entry, ...], source: Path) -> dict[str, float]:
         known = BASE_UNITS[entry.key]
         word = str(entry.value).lower()
         if word not in known:
-            raise entry.fail(f"is {str(entry.value)[:60]!r} in [UNITS]; allowed are {', '.join(known)}", source)
+            raise entry.fail(f"is {str(entry.value)[:60]!r} in [UNITS]; allowed: {', '.join(known)}", source)
         sizes[entry.key] = known[word]
     return sizes
 
@@ -133,7 +133,7 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(
-            f"{model[:60]!r} is not a Magic Formula that can be read here; allowed are PAC2002 and files with FITTYP "
+            f"{model[:60]!r} is not a Magic Formula that can be read here; allowed: PAC2002, and files with FITTYP "
             "5, 6, 21, 52, 60, 61 or 62",
             file=str(source),
             key="PROPERTY_FILE_FORMAT",
@@ -149,7 +149,7 @@ def _side(words: Mapping[str, str], source: Path) -> Side:
         return "RIGHT"
     if side not in ("LEFT", "SYMMETRIC", "SYM", "UNKNOWN", ""):
         raise TyreFileError(
-            f"is {side[:60]!r}; allowed are 'LEFT', 'RIGHT' and 'SYMMETRIC'",
+            f"is {side[:60]!r}; allowed: 'LEFT', 'RIGHT' and 'SYMMETRIC'",
             file=str(source),
             key="TYRESIDE",
             value=side,

@@ -5,7 +5,7 @@ SI and radians, ISO-W axes at the contact point):
 
     p                   record of the tyre, `record.TYRE_RECORD`
     fz                  load [N], > 0
-    dfz, dpi            load and inflation pressure relative to the nominal ones, less 1
+    dfz, dpi            load and inflation pressure relative to the nominal ones, minus 1
     pressure            inflation pressure [Pa]
     kappa               longitudinal slip, positive drives
     alpha, tan_alpha    slip angle [rad] and its tangent

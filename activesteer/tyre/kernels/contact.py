@@ -45,7 +45,7 @@ _LIFTED_DECAY_PER_S: Final = 20.0
 _SLIDING_TO_LINEAR: Final = 3.0
 """Slip of full sliding over slip at which the linear force would reach the friction limit: 3 for a brush model."""
 _SLIDING_TWIST_RAD: Final = 0.12
-"""Twist at which the whole patch slides about its middle [rad]: parking torques level off after some 5 to 8 degrees."""
+"""Twist at which the whole patch slides about its middle [rad]: parking torques level off after about 5 to 8 deg."""
 _NO_TURN_SLIP_1PM: Final = 1e-12
 """Stands for no turn slip in the formula with turn slip. Zero would select the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01

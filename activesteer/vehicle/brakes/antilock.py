@@ -15,7 +15,7 @@ whose limit exceeds the driver's demand is OFF. A front wheel that a controller 
 `intervention_slip`: a tyre at a large slip angle takes brake force only with a large slip (van Zanten 2000).
 
 At low speed the tyre builds up force slowly (relaxation length over speed), so that a wheel swings on it, and neither
-its deceleration nor a small slip tell of locking. There HOLD keeps the mean friction torque of the cycles before, and
+its deceleration nor a small slip indicate locking. There HOLD keeps the mean friction torque of the cycles before, and
 only a large slip releases the wheel. Beyond the peak of its friction a wheel would lock at a held pressure, so each
 wheel first rolls at less, in RECOVER, over the distance in which its tyre follows its slip.
 At standstill, rising pressures hand the car over to the driver.
@@ -47,7 +47,7 @@ _SETTLES_S: Final = 0.08
 _KEPT: Final = 0.9
 """Friction torque of a wheel that is released again so soon, as a fraction of the previous one."""
 _MEAN_S: Final = 0.5
-"""Time constant of the mean friction torque of a wheel [s]; a cycle lasts some 0.1 s."""
+"""Time constant of the mean friction torque of a wheel [s]; a cycle lasts about 0.1 s."""
 _HELD_LESS: Final = 0.95
 """Held torque after a release, as a fraction of the one before."""
 _IMPATIENCE_S: Final = 0.25

@@ -1,7 +1,7 @@
 """Channels computed from raw rows in compiled code.
 
-The code works on a few rows at a time. Raw rows are contiguous, and so do channels, so the data that the
-processor fetches for one channel is still in its cache for the next.
+The code works on a few rows at a time. Raw rows are contiguous, and so are channels. The data that the processor
+fetches for one channel is therefore still in its cache for the next.
 """
 
 from __future__ import annotations

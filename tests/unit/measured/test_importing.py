@@ -99,7 +99,7 @@ def test_a_column_with_an_unknown_unit_is_left_out_with_a_note(tmp_path):
     found = import_file(path)
     assert "yaw_rate_radps" not in found.metadata["measured"]["columns"]
     (note,) = found.metadata["measured"]["notes"]
-    assert note.startswith("'yaw_rate[furlong]' is left out: its unit is unknown; known are rad, deg")
+    assert note.startswith("'yaw_rate[furlong]' is left out: its unit is unknown; known: rad, deg")
 
 
 @pytest.mark.parametrize("value", [1e308, -1e308, 1.1e12])
@@ -327,7 +327,7 @@ def test_a_file_that_cannot_be_read_is_an_error_of_one_line(tmp_path, name, data
 def test_a_map_that_names_what_is_not_there_is_an_error(tmp_path):
     path = write(tmp_path / "a.csv", "t,p", [TIME_S, RATE_RADPS])
     for text, said in (
-        ('[channels]\nyaw_rate_radps = { column = "P" }\n', "there is no column 'P'; known are: p, t"),
+        ('[channels]\nyaw_rate_radps = { column = "P" }\n', "there is no column 'P'; known names: p, t"),
         ('[channels]\nyaw_rate_radps = { column = "p", unit = "bar" }\n', "is in rad/s, and 'p' in 'bar'"),
         ('[channels]\nyaw_rate_degps = { column = "p" }\n', "name it yaw_rate_radps"),
         ('axis = "sae_j670"\n', "axes"),

@@ -227,7 +227,7 @@ def test_a_bad_grid_is_one_error(change: Any, problem: str) -> None:
             + 2 * (5 * b"         0" + b"\n"),
             "not a finite number",
         ),
-        (b"$ROAD_CRG\nA = 1\n$\n$KD_DEFINITION\n#:XYZ\n$\n$$$$\n", "known are LRFI"),
+        (b"$ROAD_CRG\nA = 1\n$\n$KD_DEFINITION\n#:XYZ\n$\n$$$$\n", "known: LRFI"),
         (HEAD.format(form="LRFI", more="", blocks="").encode() + b" 0.0 junk \n" * 9, "is not a number"),
     ],
 )

@@ -142,7 +142,7 @@ def test_a_fault_acts_beside_an_earlier_one_which_goes_on() -> None:
         ("duration_s", 3.0, "cannot change during a run"),
         ("factors.mass", 1.1, "cannot change during a run: it is built into the car"),
         ("road.grade", 0.1, "cannot change during a run: only the friction"),
-        ("road.mu_left", 0.3, "no such area; give it at the start"),
+        ("road.mu_left", 0.3, "no such area; define it before the run"),
         ("controllers.bus_delay_s", 0.01, "cannot change during a run"),
         ("controllers.lqr.sideslip_scale_deg", 1.0, "has no effect: controller ars reads"),
         ("road.mu", 9.0, "out of range"),

@@ -123,8 +123,8 @@ def test_every_plot_of_the_faults_names_its_rows_and_no_dot_covers_another():
         "yaw rate sensor: offset 2 deg/s",
         "without effect: rear: stuck",
     ]
-    assert ". 1 of 3 faults change nothing" in r79_circle._fault_words(faults)
-    assert "change nothing" not in r79_circle._fault_words(faults[:2])
+    assert ". 1 of 3 faults have no effect" in r79_circle._fault_words(faults)
+    assert "have no effect" not in r79_circle._fault_words(faults[:2])
     for panel in r79_circle._dots(faults).panels:
         assert isinstance(panel, Panel)
         assert panel.names == ["rear: offset 1 deg", "yaw rate sensor: offset 2 deg/s"]

@@ -65,7 +65,7 @@ def test_an_ordinary_tyre_has_nothing_unusual() -> None:
         ({"PDX1": 2.0}, "peak friction mu_x = 2.00 at the nominal load: road tyres reach 0.6 to 1.6"),
         ({"PDY2": -0.9}, "mu_y changes its sign at "),
         ({"PKY1": -5.0}, "cornering stiffness over load is 4.4 1/rad: 8 to 25 1/rad are usual"),
-        ({"PKY1": 20.0}, "the side force would drive the tyre aside"),
+        ({"PKY1": 20.0}, "the side force would push the tyre sideways"),
         ({"PKX1": 2.0}, "slip stiffness over load is 2.0"),
         ({"QDZ1": 0.5}, "pneumatic trail"),
         ({"LATERAL_STIFFNESS": 2e4}, "lateral relaxation length"),

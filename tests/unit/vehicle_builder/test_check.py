@@ -63,14 +63,14 @@ def test_a_made_car_has_nothing_wrong_and_the_worked_example_says_what_the_check
 
 def test_values_are_those_of_the_rig_and_of_the_standing_car() -> None:
     assert compact()["front wheel rate"].value == "23.97 N/mm"
-    assert compact()["share of the weight in front"].value == "58.97 %"
+    assert compact()["share of the weight at the front"].value == "58.97 %"
     assert compact()["rear wheel hop"].value == "14.03 Hz"
 
 
 def test_every_line_that_is_not_ok_says_what_to_do(damaged: Damage) -> None:
     report = damaged("car.toml", (r"ratio = 15.814", "ratio = 12"))
     bad = [finding for finding in report.findings if finding.level != "ok"]
-    assert [finding.what for finding in bad] == ["ratio in the vehicle file, against the measured ratio"]
+    assert [finding.what for finding in bad] == ["ratio in the vehicle file, compared with the measured ratio"]
     assert all(finding.advice for finding in bad)
     assert "activesteer" not in bad[0].value
     assert bad[0].advice in " ".join(report.table().split())

@@ -183,7 +183,9 @@ def test_a_failure_is_one_typed_error_and_the_recording_is_kept(fmus, fault, sai
     assert 490 <= len(caught.value.recording) <= 500
 
 
-@pytest.mark.parametrize(("fault", "said"), [(5, "crashed in the step at .*SIGSEGV"), (6, "hangs: the step at .* 1 s")])
+@pytest.mark.parametrize(
+    ("fault", "said"), [(5, "crashed during the step at .*SIGSEGV"), (6, "hangs: the step at .* 1 s")]
+)
 def test_an_isolated_fmu_may_crash_or_hang(fmus, fault, said):
     with pytest.raises(ControllerError, match=said) as caught:
         activesteer.simulate(

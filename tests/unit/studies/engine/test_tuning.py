@@ -177,7 +177,7 @@ def test_a_metric_that_only_the_examined_run_lacks_is_a_violation(
     [
         (changed(GAINS, minimise={}), "tune", "exactly one"),
         (changed(GAINS, violate="harm(controller) <= 1"), "tune", "minimise, violate"),
-        (changed(GAINS, minimise={"a": "yaw_rate_overshoot(arse)"}), "tune.minimise.a", "known are: none"),
+        (changed(GAINS, minimise={"a": "yaw_rate_overshoot(arse)"}), "tune.minimise.a", "known names: none"),
         (changed(GAINS, minimise={"a": "yaw_rate_overshoot(none, shirt)"}), "tune.minimise.a", "short"),
         (changed(GAINS, minimise={"a": 3}), "tune.minimise.a", "string"),
         (changed(GAINS, trials=0), "tune.trials", "1"),
