@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
 from activesteer.pages import _environment, render_page
-from activesteer.pages.model import Table, picture_values
+from activesteer.pages.model import Page, Table, picture_values
 from activesteer.plotting import Curve, Panel, Picture
 from tests.contrast import contrast
 from tests.reference.chrono.comparison import Comparison
@@ -88,3 +88,8 @@ def test_a_long_curve_keeps_its_shortest_peak():
     (curve,) = panel["curves"]
     assert len(curve["x"]) == len(curve["y"]) <= 2002
     assert curve["x"][curve["y"].index(7.0)] == 54_321
+
+
+def test_a_number_in_a_heading_keeps_its_unit():
+    page = Page("t", "Sine with dwell, 80 km/h, 5 A, dry", [], [])
+    assert "<h1>Sine with dwell, 80\N{NO-BREAK SPACE}km/h, 5\N{NO-BREAK SPACE}A, dry</h1>" in render_page(page)

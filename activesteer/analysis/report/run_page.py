@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
-from activesteer.analysis.metrics import KEY_FIGURES
+from activesteer.analysis.metrics import key_figures_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
@@ -345,10 +345,9 @@ def key_figures(group: Group) -> dict[str, str]:
     """Return the key figures that at least one run has, and their column titles with units."""
     names = {name for run in group.runs for name in run.recording.metrics}
     found = {}
-    for title, metrics in KEY_FIGURES.items():
-        if name := next(filter(names.__contains__, metrics), ""):
-            unit = recorded_metric(name).unit_name
-            found[f"{title} [{unit}]" if unit else title] = name
+    for title, name in key_figures_of(names).items():
+        unit = recorded_metric(name).unit_name
+        found[f"{title} [{unit}]" if unit else title] = name
     return dict(list(found.items())[:MAX_FIGURES])
 
 

@@ -85,7 +85,9 @@ function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
   swatches.set(name, element("i", { class: "swatch" }));
-  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, name, swatches.get(name)));
+  // A long name has a row of its own, and breaks after its file.
+  const [file, ...rest] = name.split(/(?<=:)/);
+  $("controllers").append(element("label", { title: state.titles[name] ?? "", class: name.length > 14 ? "long" : "" }, box, element("span", {}, file, ...rest.flatMap((part) => [element("wbr"), part])), swatches.get(name)));
 }
 
 function without(text = "Choose at least one controller.", hint = true) {

@@ -16,7 +16,7 @@ const MANY = 6;
 // Instants of the slider; most values at a plot if those of dotted lines are among them.
 const INSTANTS = 1000, MOST_TOLD = 6;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 170, PRINTED_MOST = 920;
+const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 150, PRINTED_MOST = 920;
 
 const SVG = "http://www.w3.org/2000/svg";
 const element = (name, attributes = {}, ...children) => {
@@ -32,6 +32,8 @@ const labelRoom = (_, __, low, high, width) => {
   const step = (60 * (high - low)) / width, digits = Math.max(0, Math.min(9, Math.ceil(-Math.log10(step))));
   return 22 + 7 * Math.max(...[low, high].map((end) => `${+end.toFixed(digits)}`.length));
 };
+// Distance between the labels of a vertical axis: a low plot, as on paper, needs more than one, too [px].
+const sideRoom = (_, __, ___, ____, height) => (height < 100 ? 17 : 30);
 const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
 // A number with a real minus sign, and none before zero.
 const shown = (number) => {
@@ -124,7 +126,7 @@ class Chart {
 
   make() {
     const { panel } = this, log = (key) => (panel.log.includes(key) ? { distr: 3 } : {});
-    const plain = { ...axis(26), space: labelRoom }, side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
+    const plain = { ...axis(26), space: labelRoom }, side = { ...axis(52), space: sideRoom, size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
     // Names stand above their rows, where there is room for them at any width.
     if (panel.names.length) Object.assign(side, { size: 8, values: () => [], splits: () => panel.names.map((_, i) => i) });
     for (const [axis, levels, room] of [[plain, panel.x_levels, 60], [side, panel.y_levels, 14]]) {

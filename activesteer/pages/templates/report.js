@@ -82,7 +82,7 @@
         width: holder.clientWidth || 360, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
         cursor: { y: false, sync: { key: this.data.anchor }, drag: { x: true, y: false }, points: { size: 7 } },
         scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
-        axes: [axis(26, " s"), axis(46)],
+        axes: [axis(26, " s"), { ...axis(50), space: sideRoom }],
         series: [{}, ...lines],
         hooks: {
           drawAxes: shaded ? [(u) => this.shade(u)] : [], draw: [(u) => this.marks(u)],
@@ -115,7 +115,8 @@
         const at = values.findIndex((value) => value != null && Math.abs(value) > limit);
         return at < 0 ? [] : [`${several ? `${this.data.runs[run].name} ` : ""}from ${this.time[at].toFixed(2)} s`];
       });
-      return `Shaded, beyond ${limit.toFixed(1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${beyond.join(", ") || (several ? "no run" : "never")}.`;
+      const most = `eyond ${limit.toFixed(1)} deg${beyond.length ? ":" : ","} more slip gives the rear tyres less side force.`;
+      return beyond.length ? `Shaded, b${most} Rear axle beyond it: ${beyond.join(", ")}.` : `B${most} ${several ? "All rear axles stay" : "The rear axle stays"} below.`;
     }
 
     shade(u) {
@@ -196,7 +197,7 @@
         width: holder.clientWidth || 360, height: this.height(holder.clientWidth || 360), padding: [6, 18, 0, 0], legend: { show: false },
         cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false }, x: false, y: false },
         scales: { x: { time: false, range: (u) => this.range(u, "x") }, y: { range: (u) => this.range(u, "y") } },
-        axes: [axis(26, " m"), axis(46, " m")],
+        axes: [axis(26, " m"), { ...axis(50, " m"), space: sideRoom }],
         series: [{}, { show: true, paths: () => null, points: { show: false } }],
         hooks: {
           drawAxes: [(u) => this.draw(u)],
