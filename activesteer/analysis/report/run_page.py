@@ -360,10 +360,13 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     if LOST in (text, shown(name, first or {}, "")) or not math.isfinite(value - before):
         return {"text": text, "difference": "", "change": Change.OTHER}
     difference = difference_text(name, value, before)
+    # Percentages of the first value stand in the same row, so other differences have their unit.
+    unit = {"%": "points"}.get(recorded_metric(name).unit_name, recorded_metric(name).unit_name)
+    plain = f"{difference.text}\N{NO-BREAK SPACE}{unit}" if unit and difference.text != "0" else difference.text
     if is_near(name, value, before):
-        return {"text": text, "difference": difference.text, "change": Change.SAME}
+        return {"text": text, "difference": plain, "change": Change.SAME}
     change = significance(name, metrics[name], (first or {})[name])
-    return {"text": text, "difference": difference.percent or difference.text, "change": change}
+    return {"text": text, "difference": difference.percent or plain, "change": change}
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:
