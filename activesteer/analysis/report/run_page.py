@@ -343,7 +343,7 @@ def _is_judged(run: ReportedRun) -> bool:
 
 def key_figures(group: Group) -> dict[str, str]:
     """Return the key figures that at least one run has, and their column titles with units."""
-    names = {name for run in group.runs for name in run.recording.metrics}
+    names = {name for run in group.runs for name, value in run.recording.metrics.items() if math.isfinite(value)}
     found = {}
     for title, name in key_figures_of(names).items():
         unit = recorded_metric(name).unit_name
