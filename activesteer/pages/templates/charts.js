@@ -13,6 +13,8 @@ const LEAST_CONE = 2, CARS_APART = 110;
 const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
 // Plots of a picture from which on four stand in a row on a wide screen, unless they are over time.
 const MANY = 6;
+// Height of a row with a name below which its texts are small [px].
+const LOW_ROW = 26;
 // Instants of the slider; most values at a plot if those of dotted lines are among them.
 const INSTANTS = 1000, MOST_TOLD = 6;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
@@ -220,7 +222,9 @@ class Chart {
     ctx.globalAlpha = 1;
     ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
     for (const [value] of panel.limits) level(py(value));
-    ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
+    // Names and values of low rows, as on paper, are small, so that they do not meet.
+    const low = panel.names.length && py(1) - py(0) < LOW_ROW * dpr;
+    ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${(low ? 9 : 12) * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
       ctx.fillStyle = colour || paint.ink;
@@ -232,7 +236,7 @@ class Chart {
     }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 7 * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - (low ? 5 : 7) * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 
