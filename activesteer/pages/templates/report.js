@@ -2,6 +2,7 @@
 // instant. Data: `groups` of the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
 (() => {
   const SLIP = "Slip angle of the axles";
+  const BODY_STEP = 8; // instants from one body to the next in the limits of the track
 
   class Group {
     constructor(data) {
@@ -186,7 +187,7 @@
       this.data = data;
       const note = this.note = element("span", { class: "quiet" });
       const title = [element("b", {}, "Track of the front axle centre"), note];
-      const finite = (key) => data.whole?.[key] ?? data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
+      const finite = (key) => [...(data.whole?.[key] ?? data.tracks.flatMap((track) => track[key])), ...this.bodies(key)].filter((value) => value != null);
       this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
       // A course and a long track fill the width; a square track stands beside two plots.
       const span = ([low, high]) => high - low;
@@ -223,6 +224,13 @@
       if (this.data.view || (this.tall && !printed && !NARROW.matches)) return most;
       const { x, y } = this.limits;
       return Math.min(most, Math.max(LEAST_TRACK_HEIGHT, 32 + ((width - 64) * (y[1] - y[0])) / (x[1] - x[0])));
+    }
+
+    // Coordinates of the corners of the cars, at some instants: the plot shows whole cars.
+    bodies(key) {
+      const place = key === "x" ? 0 : 1;
+      return this.data.tracks.filter(({ car }) => car).flatMap((track) => track.x.flatMap((x, i) =>
+        (x == null || track.y[i] == null || track.yaw[i] == null || (i % BODY_STEP && i < track.x.length - 1) ? [] : carFromAbove(track, i)[0].map((corner) => corner[place]))));
     }
 
     ends(values) {
