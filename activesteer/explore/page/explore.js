@@ -290,7 +290,8 @@ function showFigures() {
 
 function showSliders() {
   const groups = [...new Set(state.sliders.map((slider) => slider.group))];
-  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
+  // The groups of a phone are all open, and say nothing of a wide window.
+  const open = new Set([...$("sliders").querySelectorAll(state.single ? "none" : "details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
     box.open = open.size ? open.has(group) || !known.has(group) : i !== 1;
@@ -300,7 +301,8 @@ function showSliders() {
   const before = $("group").value;
   $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, `Sliders: ${group}`)));
   if (groups.includes(before)) $("group").value = before;
-  if (small.matches) showGroup();
+  state.single = small.matches;
+  if (state.single) showGroup();
 }
 
 // A phone has room for one group of sliders above the results.
