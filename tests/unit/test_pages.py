@@ -101,3 +101,7 @@ def test_a_figure_over_whole_numbers_has_whole_ticks(runs: list[int]):
     (axis,) = draw(Picture("", [Panel("runs", "margin [-]", [Curve(runs, [1.0] * len(runs))])])).axes
     low, high = axis.get_xlim()
     assert [tick for tick in axis.get_xticks() if low <= tick <= high] == runs
+
+
+def test_a_column_of_the_controller_none_is_no_column_of_numbers():
+    assert Table("", ["file", "controller", "duration"], [["a", "none", "5"], ["b", "none", "-"]]).number_columns == {2}

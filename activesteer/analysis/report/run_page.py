@@ -181,7 +181,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     details = [_claim(item, anchor) for item in card.judged]
     claims = Section("What the paper claims", points=details, level=3, kind="claims")
     told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
-    told += [f"{each}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
+    told += [f"{each[0].upper()}{each[1:]}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
     for name, run in zip(names, runs, strict=True):
         if error := run.metadata.get("metrics_error"):
             told.append(f"{name}: no metrics: {error}")
