@@ -17,7 +17,7 @@ Source: 68 FR 59250 (2003), Consumer Information; New Car Assessment Program; Ro
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -203,12 +203,20 @@ KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
     kind: tuple(_TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"])) for kind in EVALUATIONS
 }
 """Kind of manoeuvre -> metrics that are printed first and held against the baseline, the most telling first."""
+_ON_A_PATH: Final[dict[str, str]] = _TABLE["key_figures"]["titles_on_a_path"]
+_PATH: Final = "track_deviation_max_m"
 _TITLES: Final[dict[str, str]] = _TABLE["key_figures"]["titles"]
 KEY_FIGURES: Final = {
     _TITLES.get(names[0], metric(names[0]).label[0].upper() + metric(names[0]).label[1:]): tuple(names)
     for names in _TABLE["key_figures"]["metrics"]
 }
 """Title of a key figure -> names of metrics, of which the first one that a run has is shown and named."""
+
+
+def key_figures_of(names: Collection[str]) -> dict[str, str]:
+    """Return the key figures among the metrics of a run: titles and names of metrics."""
+    found = {title: next(filter(names.__contains__, of), "") for title, of in KEY_FIGURES.items()}
+    return {_ON_A_PATH.get(name, title) if _PATH in names else title: name for title, name in found.items() if name}
 
 
 def evaluated_kind(recording: RecordingLike) -> str:

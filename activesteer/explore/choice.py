@@ -73,9 +73,9 @@ class Folder:
             return
         file = name.partition(":")[0]
         if not re.fullmatch(_OWN[kind], name):
-            known = self.names()[kind]
+            known = nearest_names(name, self.names()[kind])
             raise ParameterError(
-                f"is {shown(name)}; files in {self.path} are named without a folder; {nearest_names(name, known)}",
+                f"there is no {shown(name)}; files in {self.path} are named without a folder; {known}",
                 key=key, value=name,
             )  # fmt: skip
         if not is_file(self.path / file):

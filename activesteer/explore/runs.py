@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.harm import LOST, losses, shown
-from activesteer.analysis.metrics import KEY_FIGURES
+from activesteer.analysis.metrics import key_figures_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
@@ -54,6 +54,8 @@ _MANEUVER: Final = {
     "brake.pedal": (0.0, 1.0, 0.01),
 }
 """Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges suit passenger cars."""
+_LABELS: Final = {"road.patches.0.mu": "first road patch: friction coefficient"}
+"""Labels of sliders whose keys read badly as words."""
 _CAR: Final = {
     "factors.mass": (0.8, 1.4, 0.01),
     "factors.yaw_inertia": (0.7, 1.4, 0.01),
@@ -109,7 +111,9 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
             value = value_of(scenario, key)
             # A manoeuvre that begins at rest has its speeds in its phases.
             if _moves(scenario, key, value) and not (key == "speed_kmh" and value == 0.0):
-                yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
+                label, unit = parameter_label(key)
+                label = _LABELS.get(key, label)
+                yield Slider(key, label, unit, group, min(low, value), max(high, value), step, value)
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:
@@ -411,18 +415,16 @@ def _plain(name: str) -> str:
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
     found = []
-    for title, names in KEY_FIGURES.items():
-        name = next((name for name in names if name in recording.metrics), None)
-        if name is not None:
-            metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
-            size = abs(value) if metric.better is Better.SMALLER else value
-            is_lost = shown(name, recording.metrics, "") == LOST
-            # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
-            fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
-            digits = 0 if metric.whole else 3 if fine else None
-            known = size if math.isfinite(size) and not is_lost else None
-            figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
-            if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
-                figure["value"] = None if known is None else -known
-            found.append(figure)
+    for title, name in key_figures_of(recording.metrics).items():
+        metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
+        size = abs(value) if metric.better is Better.SMALLER else value
+        is_lost = shown(name, recording.metrics, "") == LOST
+        # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
+        fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
+        digits = 0 if metric.whole else 3 if fine else None
+        known = size if math.isfinite(size) and not is_lost else None
+        figure = {"title": title, "unit": metric.unit_name, "value": known, "digits": digits, "lost": is_lost}
+        if name == LANE_OVERSTEP:  # a distance that is negative inside the lane reads like a fault
+            figure["value"] = None if known is None else -known
+        found.append(figure)
     return found

@@ -6,6 +6,7 @@ Out: HTML pages that work without a network.
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -48,11 +49,17 @@ def _environment() -> Environment:
     environment.globals |= {"version": __version__, "asset": _asset}
     environment.globals |= {"run_colours": RUN_COLOURS, "run_colours_on_dark": RUN_COLOURS_ON_DARK}
     environment.filters["typeset"] = _typeset
+    environment.filters["unbroken"] = _unbroken
     return environment
 
 
 def _typeset(text: Text) -> Text:
     return text if isinstance(text, Markup) else typeset(text)
+
+
+def _unbroken(text: Text) -> Text:
+    """Keep a number and its unit in one line."""
+    return text if isinstance(text, Markup) else re.sub(r"(?<=\d) (?=[^\W\d])", "\N{NO-BREAK SPACE}", text)
 
 
 def _asset(name: str) -> Markup:

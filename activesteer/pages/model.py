@@ -126,6 +126,11 @@ _LONG_WORD: Final = 24
 _NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")
 
 
+def _is_numeric(column: Sequence[str]) -> bool:
+    """Return whether all cells are numbers or say that there is none. The controller `none` is a word."""
+    return all(map(_NUMBER.fullmatch, column)) and any(cell[-1:].isdigit() for cell in column)
+
+
 class Table(NamedTuple):
     """A table of a page.
 
@@ -165,7 +170,7 @@ class Table(NamedTuple):
     def number_columns(self) -> frozenset[int]:
         """Indices of the right-aligned columns: the last `numbers` columns, and numeric columns."""
         columns = [[_plain(cell) for cell in column] for column in zip(*self.rows, strict=True)]
-        found = {place for place, column in enumerate(columns) if place and all(map(_NUMBER.fullmatch, column))}
+        found = {place for place, column in enumerate(columns) if place and _is_numeric(column)}
         return frozenset(found.union(range(len(self.columns) - self.numbers, len(self.columns))))
 
     def lines(self) -> Iterator[str]:

@@ -151,6 +151,8 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
             of.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             of.set_major_formatter("{x:g}")
             of.set_minor_formatter(NullFormatter())
+    elif panel.curves and all(np.all(np.asarray(curve.x) % 1 == 0) for curve in panel.curves):
+        axis.locator_params(axis="x", integer=True, min_n_ticks=1)  # such as runs, of which there is no half
     if panel.names:
         axis.set_yticks(range(len(panel.names)), panel.names)
         axis.invert_yaxis()

@@ -12,8 +12,8 @@ from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
 from activesteer.pages import _environment, render_page
-from activesteer.pages.model import Table, picture_values
-from activesteer.plotting import Curve, Panel, Picture
+from activesteer.pages.model import Page, Table, picture_values
+from activesteer.plotting import Curve, Panel, Picture, draw
 from tests.contrast import contrast
 from tests.reference.chrono.comparison import Comparison
 from tests.reference.chrono.kinematics import Curves
@@ -88,3 +88,20 @@ def test_a_long_curve_keeps_its_shortest_peak():
     (curve,) = panel["curves"]
     assert len(curve["x"]) == len(curve["y"]) <= 2002
     assert curve["x"][curve["y"].index(7.0)] == 54_321
+
+
+def test_a_number_in_a_heading_keeps_its_unit():
+    page = Page("t", "Sine with dwell, 80 km/h, 5 A, dry", [], [])
+    assert "<h1>Sine with dwell, 80\N{NO-BREAK SPACE}km/h, 5\N{NO-BREAK SPACE}A, dry</h1>" in render_page(page)
+
+
+@pytest.mark.parametrize("runs", [[2], [1, 2, 3]])
+def test_a_figure_over_whole_numbers_has_whole_ticks(runs: list[int]):
+    pytest.importorskip("matplotlib")
+    (axis,) = draw(Picture("", [Panel("runs", "margin [-]", [Curve(runs, [1.0] * len(runs))])])).axes
+    low, high = axis.get_xlim()
+    assert [tick for tick in axis.get_xticks() if low <= tick <= high] == runs
+
+
+def test_a_column_of_the_controller_none_is_no_column_of_numbers():
+    assert Table("", ["file", "controller", "duration"], [["a", "none", "5"], ["b", "none", "-"]]).number_columns == {2}

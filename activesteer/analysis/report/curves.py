@@ -48,7 +48,7 @@ def _signals(panel: Panel, view: str, recording: Recording) -> Iterator[tuple[bo
                 values = path_distance(*front_axle(recording), path.x_m, path.y_m)
             else:
                 values = line.of(recording)
-            if values is not None:
+            if values is not None and np.isfinite(values).any():
                 yield place > 0, values
 
 

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
-from activesteer.analysis.metrics import KEY_FIGURES
+from activesteer.analysis.metrics import key_figures_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
@@ -181,7 +181,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     details = [_claim(item, anchor) for item in card.judged]
     claims = Section("What the paper claims", points=details, level=3, kind="claims")
     told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
-    told += [f"{each}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
+    told += [f"{each[0].upper()}{each[1:]}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
     for name, run in zip(names, runs, strict=True):
         if error := run.metadata.get("metrics_error"):
             told.append(f"{name}: no metrics: {error}")
@@ -343,12 +343,11 @@ def _is_judged(run: ReportedRun) -> bool:
 
 def key_figures(group: Group) -> dict[str, str]:
     """Return the key figures that at least one run has, and their column titles with units."""
-    names = {name for run in group.runs for name in run.recording.metrics}
+    names = {name for run in group.runs for name, value in run.recording.metrics.items() if math.isfinite(value)}
     found = {}
-    for title, metrics in KEY_FIGURES.items():
-        if name := next(filter(names.__contains__, metrics), ""):
-            unit = recorded_metric(name).unit_name
-            found[f"{title} [{unit}]" if unit else title] = name
+    for title, name in key_figures_of(names).items():
+        unit = recorded_metric(name).unit_name
+        found[f"{title} [{unit}]" if unit else title] = name
     return dict(list(found.items())[:MAX_FIGURES])
 
 
@@ -361,10 +360,13 @@ def _figure(name: str, metrics: Mapping[str, float], first: Mapping[str, float] 
     if LOST in (text, shown(name, first or {}, "")) or not math.isfinite(value - before):
         return {"text": text, "difference": "", "change": Change.OTHER}
     difference = difference_text(name, value, before)
+    # Percentages of the first value stand in the same row, so other differences have their unit.
+    unit = {"%": "points"}.get(recorded_metric(name).unit_name, recorded_metric(name).unit_name)
+    plain = f"{difference.text}\N{NO-BREAK SPACE}{unit}" if unit and difference.text != "0" else difference.text
     if is_near(name, value, before):
-        return {"text": text, "difference": difference.text, "change": Change.SAME}
+        return {"text": text, "difference": plain, "change": Change.SAME}
     change = significance(name, metrics[name], (first or {})[name])
-    return {"text": text, "difference": difference.percent or difference.text, "change": change}
+    return {"text": text, "difference": difference.percent or plain, "change": change}
 
 
 def file_rows(groups: Sequence[Group]) -> tuple[list[str], list[list[str]]]:

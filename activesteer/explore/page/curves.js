@@ -89,7 +89,9 @@ export class Curves {
       if (at >= 0) (of(false) < 0 ? front : rear).push(`${name} from ${number(run.plots.start_s + at * run.plots.step_s, 2)} s`);
     }
     shown.told ??= shown.figure.appendChild(element("p", { class: "quiet told" }));
-    shown.told.textContent = limit == null ? "" : `Shaded, beyond ${number(limit, 1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${rear.join(", ") || "no run"}.${front.length ? ` Only front axle beyond it: ${front.join(", ")}.` : ""}`;
+    const most = `eyond ${number(limit, 1)} deg${rear.length || front.length ? ":" : ","} more slip gives the rear tyres less side force.`;
+    const which = [["Rear axle", rear], ["Only the front axle", front]].filter(([, names]) => names.length).map(([axle, names]) => ` ${axle} beyond it: ${names.join(", ")}.`).join("");
+    shown.told.textContent = limit == null ? "" : which ? `Shaded, b${most}${which}` : `B${most} All axles stay below.`;
   }
 
   limit() { return [...this.runs.values()].find((run) => run.plots)?.plots.slip_limit_deg ?? null; }
@@ -118,21 +120,32 @@ export class Curves {
 
   // Borders of phases, and instants of a standard.
   marks(u) {
-    const { ctx, bbox } = u, marks = [...this.runs.values()].find((run) => run.plots)?.plots.marks ?? [];
+    const { ctx, bbox } = u;
     ctx.save();
-    ctx.strokeStyle = ctx.fillStyle = paint("quiet");
+    ctx.strokeStyle = paint("quiet");
     ctx.lineWidth = devicePixelRatio;
-    ctx.font = FONT.replace("12px", `${11 * devicePixelRatio}px`);
-    ctx.textAlign = "left";
     ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
-    const first = u === this.plots.values().next().value?.plot;
-    let free = -Infinity; // where the words of the mark before end
-    for (const { time_s, text } of marks) {
+    for (const { time_s } of this.marked()) {
       const x = u.valToPos(time_s, "x", true);
       ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-      if (!first || x < free) continue;
-      ctx.fillText(text, x + 3 * devicePixelRatio, bbox.top + 11 * devicePixelRatio);
-      free = x + 3 * devicePixelRatio + ctx.measureText(text).width;
+    }
+    ctx.restore();
+  }
+
+  marked() { return [...this.runs.values()].find((run) => run.plots)?.plots.marks ?? []; }
+
+  // The words of the marks, in the first plot. They lie over the curves.
+  words(u) {
+    if (u !== this.plots.values().next().value?.plot) return;
+    const { ctx, bbox } = u;
+    let free = -Infinity; // where the words of the mark before end
+    ctx.save();
+    Object.assign(ctx, { fillStyle: paint("quiet"), strokeStyle: paint("paper"), lineWidth: 3 * devicePixelRatio, font: FONT.replace("12px", `${11 * devicePixelRatio}px`), textAlign: "left" });
+    for (const { time_s, text } of this.marked()) {
+      const x = u.valToPos(time_s, "x", true) + 3 * devicePixelRatio;
+      if (x < free) continue;
+      for (const ink of ["strokeText", "fillText"]) ctx[ink](text, x, bbox.top + 11 * devicePixelRatio);
+      free = x + ctx.measureText(text).width;
     }
     ctx.restore();
   }
@@ -165,9 +178,9 @@ export class Curves {
       width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
       cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
-      axes: [{ ...axis(30, " s"), gap: 8 }, axis(44)],
+      axes: [{ ...axis(30, " s"), gap: 8 }, axis(50)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, gaps: wideGaps, points: { show: false } }))],
-      hooks: { drawAxes: [(u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
+      hooks: { drawAxes: [(u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], draw: [(u) => this.words(u)], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
         const i = u.cursor.idx;
         const valueOf = (line, k) => element("span", { style: `border-bottom: 2px ${line.dotted ? "dotted" : "solid"} ${runColour(line.place)}` }, number(u.data[k + 1][i]));
         shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost ? [] : [valueOf(line, k), " "]))]));

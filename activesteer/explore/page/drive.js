@@ -364,18 +364,18 @@ export class Drive {
     $("end").hidden = $("again").hidden = true;
     const same = this.compared && String(this.address) === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
-    const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)} s ${lap < before ? "faster" : "slower"} than the ghost` : "";
+    const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)}\u00a0s ${lap < before ? "faster" : "slower"} than the ghost` : "";
     const count = ["no cone", "1 cone"][this.struck] ?? `${this.struck} cones`;
-    const cones = !this.scene.cones.length ? "" : !lap || !this.struck ? `, ${count} hit` : `, with ${number(this.penalty_s, 0)} s for ${count}`;
-    const timed = lap ? `${this.way}: ${number(lap, 2)} s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: the last gate was not passed${cones}. ` : "";
+    const cones = !this.scene.cones.length ? "" : !lap || !this.struck ? `, ${count} hit` : `, with ${number(this.penalty_s, 0)}\u00a0s for ${count}`;
+    const timed = lap ? `${this.way}: ${number(lap, 2)}\u00a0s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: the last gate was not passed${cones}. ` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
-    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)} ms.`;
+    const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)}\u00a0ms.`;
     const earlier = this.earlier;
     if (!this.again) this.earlier = "";
-    else if (lap) this.earlier = `Before the restart: ${this.way.toLowerCase()} ${number(lap, 2)} s, saved as ${header.file}. `;
+    else if (lap) this.earlier = `Before the restart: ${this.way.toLowerCase()} ${number(lap, 2)}\u00a0s, saved as ${header.file}. `;
     if (this.shown && this.ready) this.prepare();
     // A small screen has no room for what few want to know.
-    $("driven").replaceChildren(`${earlier}${timed}${number(header.time_s, 1)} s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)} s behind the clock`}.`, element("span", { class: "more" }, latency),
+    $("driven").replaceChildren(`${earlier}${timed}${number(header.time_s, 1)}\u00a0s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)}\u00a0s behind the clock`}.`, element("span", { class: "more" }, latency),
       ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
     $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);

@@ -85,7 +85,9 @@ function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
   swatches.set(name, element("i", { class: "swatch" }));
-  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, name, swatches.get(name)));
+  // A long name has a row of its own, and breaks after its file.
+  const [file, ...rest] = name.split(/(?<=:)/);
+  $("controllers").append(element("label", { title: state.titles[name] ?? "", class: name.length > 14 ? "long" : "" }, box, element("span", {}, file, ...rest.flatMap((part) => [element("wbr"), part])), swatches.get(name)));
 }
 
 function without(text = "Choose at least one controller.", hint = true) {
@@ -288,7 +290,8 @@ function showFigures() {
 
 function showSliders() {
   const groups = [...new Set(state.sliders.map((slider) => slider.group))];
-  const open = new Set([...$("sliders").querySelectorAll("details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
+  // The groups of a phone are all open, and say nothing of a wide window.
+  const open = new Set([...$("sliders").querySelectorAll(state.single ? "none" : "details[open]")].map((box) => box.dataset.group)), known = new Set([...$("group").options].map(({ value }) => value));
   $("sliders").replaceChildren(...groups.map((group, i) => {
     const box = element("details", { "data-group": group }, element("summary", {}, group));
     box.open = open.size ? open.has(group) || !known.has(group) : i !== 1;
@@ -298,7 +301,8 @@ function showSliders() {
   const before = $("group").value;
   $("group").replaceChildren(...groups.map((group) => element("option", { value: group }, `Sliders: ${group}`)));
   if (groups.includes(before)) $("group").value = before;
-  if (small.matches) showGroup();
+  state.single = small.matches;
+  if (state.single) showGroup();
 }
 
 // A phone has room for one group of sliders above the results.

@@ -13,10 +13,12 @@ const LEAST_CONE = 2, CARS_APART = 110;
 const LEAST_TRACK_HEIGHT = 120, MOST_STRETCH = 2.5;
 // Plots of a picture from which on four stand in a row on a wide screen, unless they are over time.
 const MANY = 6;
+// Height of a row with a name below which its texts are small [px].
+const LOW_ROW = 26;
 // Instants of the slider; most values at a plot if those of dotted lines are among them.
 const INSTANTS = 1000, MOST_TOLD = 6;
 // Width of paper between its margins [CSS px], less the gap, for the two columns of a printed page.
-const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 170, PRINTED_MOST = 920;
+const PRINTED = 660, PRINTED_GAP = 16, PRINTED_PLOT_HEIGHT = 100, PRINTED_TRACK_HEIGHT = 150, PRINTED_MOST = 920;
 
 const SVG = "http://www.w3.org/2000/svg";
 const element = (name, attributes = {}, ...children) => {
@@ -32,6 +34,8 @@ const labelRoom = (_, __, low, high, width) => {
   const step = (60 * (high - low)) / width, digits = Math.max(0, Math.min(9, Math.ceil(-Math.log10(step))));
   return 22 + 7 * Math.max(...[low, high].map((end) => `${+end.toFixed(digits)}`.length));
 };
+// Distance between the labels of a vertical axis: a low plot, as on paper, needs more than one, too [px].
+const sideRoom = (_, __, ___, ____, height) => (height < 100 ? 17 : 30);
 const axis = (size, unit = "") => ({ values: labels(unit), stroke: () => paint.quiet, font: FONT, size, gap: 4, grid: { stroke: () => paint.grid, width: 1 }, ticks: { show: false } });
 // A number with a real minus sign, and none before zero.
 const shown = (number) => {
@@ -124,7 +128,7 @@ class Chart {
 
   make() {
     const { panel } = this, log = (key) => (panel.log.includes(key) ? { distr: 3 } : {});
-    const plain = { ...axis(26), space: labelRoom }, side = { ...axis(52), size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
+    const plain = { ...axis(26), space: labelRoom }, side = { ...axis(52), space: sideRoom, size: (u, ticks) => Math.max(34, 12 + 7 * Math.max(0, ...(ticks || []).map((tick) => `${tick}`.length))) };
     // Names stand above their rows, where there is room for them at any width.
     if (panel.names.length) Object.assign(side, { size: 8, values: () => [], splits: () => panel.names.map((_, i) => i) });
     for (const [axis, levels, room] of [[plain, panel.x_levels, 60], [side, panel.y_levels, 14]]) {
@@ -218,7 +222,9 @@ class Chart {
     ctx.globalAlpha = 1;
     ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
     for (const [value] of panel.limits) level(py(value));
-    ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${12 * dpr}px`);
+    // Names and values of low rows, as on paper, are small, so that they do not meet.
+    const low = panel.names.length && py(1) - py(0) < LOW_ROW * dpr;
+    ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${(low ? 9 : 12) * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
       ctx.fillStyle = colour || paint.ink;
@@ -230,7 +236,7 @@ class Chart {
     }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - 7 * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - (low ? 5 : 7) * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 

@@ -2,6 +2,7 @@
 // instant. Data: `groups` of the JSON in #data, from `curves.plots`. Shared parts: `charts.js`.
 (() => {
   const SLIP = "Slip angle of the axles";
+  const BODY_STEP = 8; // instants from one body to the next in the limits of the track
 
   class Group {
     constructor(data) {
@@ -82,7 +83,7 @@
         width: holder.clientWidth || 360, height: PLOT_HEIGHT, padding: [6, 18, 0, 0], legend: { show: false }, pxAlign: 0,
         cursor: { y: false, sync: { key: this.data.anchor }, drag: { x: true, y: false }, points: { size: 7 } },
         scales: { x: { time: false, range: (_, min, max) => [min, max] }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
-        axes: [axis(26, " s"), axis(46)],
+        axes: [axis(26, " s"), { ...axis(50), space: sideRoom }],
         series: [{}, ...lines],
         hooks: {
           drawAxes: shaded ? [(u) => this.shade(u)] : [], draw: [(u) => this.marks(u)],
@@ -115,7 +116,8 @@
         const at = values.findIndex((value) => value != null && Math.abs(value) > limit);
         return at < 0 ? [] : [`${several ? `${this.data.runs[run].name} ` : ""}from ${this.time[at].toFixed(2)} s`];
       });
-      return `Shaded, beyond ${limit.toFixed(1)} deg: more slip gives the rear tyres less side force. Rear axle beyond it: ${beyond.join(", ") || (several ? "no run" : "never")}.`;
+      const most = `eyond ${limit.toFixed(1)} deg${beyond.length ? ":" : ","} more slip gives the rear tyres less side force.`;
+      return beyond.length ? `Shaded, b${most} Rear axle beyond it: ${beyond.join(", ")}.` : `B${most} ${several ? "All rear axles stay" : "The rear axle stays"} below.`;
     }
 
     shade(u) {
@@ -185,7 +187,7 @@
       this.data = data;
       const note = this.note = element("span", { class: "quiet" });
       const title = [element("b", {}, "Track of the front axle centre"), note];
-      const finite = (key) => data.whole?.[key] ?? data.tracks.flatMap((track) => track[key]).filter((value) => value != null);
+      const finite = (key) => [...(data.whole?.[key] ?? data.tracks.flatMap((track) => track[key])), ...this.bodies(key)].filter((value) => value != null);
       this.limits = data.view || { x: this.ends(finite("x")), y: this.ends(finite("y")) };
       // A course and a long track fill the width; a square track stands beside two plots.
       const span = ([low, high]) => high - low;
@@ -196,7 +198,7 @@
         width: holder.clientWidth || 360, height: this.height(holder.clientWidth || 360), padding: [6, 18, 0, 0], legend: { show: false },
         cursor: { drag: { x: true, y: true, uni: 20 }, points: { show: false }, x: false, y: false },
         scales: { x: { time: false, range: (u) => this.range(u, "x") }, y: { range: (u) => this.range(u, "y") } },
-        axes: [axis(26, " m"), axis(46, " m")],
+        axes: [axis(26, " m"), { ...axis(50, " m"), space: sideRoom }],
         series: [{}, { show: true, paths: () => null, points: { show: false } }],
         hooks: {
           drawAxes: [(u) => this.draw(u)],
@@ -222,6 +224,13 @@
       if (this.data.view || (this.tall && !printed && !NARROW.matches)) return most;
       const { x, y } = this.limits;
       return Math.min(most, Math.max(LEAST_TRACK_HEIGHT, 32 + ((width - 64) * (y[1] - y[0])) / (x[1] - x[0])));
+    }
+
+    // Coordinates of the corners of the cars, at some instants: the plot shows whole cars.
+    bodies(key) {
+      const place = key === "x" ? 0 : 1;
+      return this.data.tracks.filter(({ car }) => car).flatMap((track) => track.x.flatMap((x, i) =>
+        (x == null || track.y[i] == null || track.yaw[i] == null || (i % BODY_STEP && i < track.x.length - 1) ? [] : carFromAbove(track, i)[0].map((corner) => corner[place]))));
     }
 
     ends(values) {

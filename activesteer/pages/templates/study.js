@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3;
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24;
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -38,13 +38,13 @@ const placeOf = (factor, value) => (value == null || factor.numeric ? value : fa
 // The factors that vary in some rows; others belong to other manoeuvres.
 const varied = (rows) => DATA.factors.filter(({ key }) => rows.some((i) => DATA.rows.factors[key][i] != null));
 
-// Points of controllers stand side by side where the levels of a factor would put them on one line. Few runs over one factor are joined.
+// Few points are large, so that they are seen. Points of controllers stand side by side where the levels of a factor would put them on one line. Few runs over one factor are joined.
 function scatter(factor, label, rows, valueOf, joined = false) {
   const beside = (c) => (factor.numeric ? 0 : APART * (c - (DATA.controllers.length - 1) / 2));
   const curves = DATA.controllers.map((_, c) => {
     const own = rows.filter((i) => DATA.rows.controller[i] === c && valueOf(i) != null && DATA.rows.factors[factor.key][i] != null);
     if (joined) own.sort((i, k) => DATA.rows.factors[factor.key][i] - DATA.rows.factors[factor.key][k]);
-    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i]) + beside(c)), own.map(valueOf), { ...(joined ? { dashes: [], width: 1.5, size: 7 } : { alpha: 0.6 }), told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
+    return curveOf(c, own.map((i) => placeOf(factor, DATA.rows.factors[factor.key][i]) + beside(c)), own.map(valueOf), { ...(joined ? { dashes: [], width: 1.5, size: 7 } : own.length <= SPARSE ? { size: 7 } : { alpha: 0.6 }), told: own.map((i) => `${short(valueOf(i))} (run ${DATA.rows.run[i]})`) });
   });
   return panelOf(axisOf(factor), label, { title: factor.label, curves: curves.filter((curve) => curve.x.length), x_levels: factor.numeric ? null : factor.levels });
 }

@@ -168,6 +168,10 @@ def test_titles_of_key_figures_say_what_differs_from_the_metric():
         "Final heading, magnitude [deg]",
     ]  # fmt: skip
     assert [figure["text"] for figure in told(groups)["none"]["figures"]] == ["0.200", "40.00", "28.65"]
+    assert list(key_figures(through_cones(none={"track_deviation_max_m": 1.0, "heading_end_rad": 0.1}))) == [
+        "Largest track deviation [m]", "Final heading against the path, magnitude [deg]",
+    ]  # fmt: skip
+    assert list(key_figures(through_cones(none={"cones_hit": 1.0, "lap_time_s": math.nan}))) == ["Cones hit"]
 
 
 def test_a_single_run_has_no_number():

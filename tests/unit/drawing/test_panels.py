@@ -83,3 +83,11 @@ def test_the_sideslip_angle_of_a_car_that_turns_round_has_no_jump() -> None:
     beyond_deg = np.array([170.0, 179.0, -178.0, -170.0, 178.0])
     shown = drawn_values({"sideslip_rad": np.radians(beyond_deg), "yaw_rad": np.radians(beyond_deg)}, "sideslip_rad")
     assert np.degrees(shown) == pytest.approx([170.0, 179.0, 182.0, 190.0, 178.0])
+
+
+def test_an_axle_at_rest_has_no_slip_angle() -> None:
+    wheels = {f"{wheel}_{name}": np.full(2, value) for wheel in ("fl", "fr")
+              for name, value in (("slip_angle_rad", 0.05), ("tyre_fz_N", 4000.0))}  # fmt: skip
+    shown = drawn_values({**wheels, "speed_mps": np.array([0.01, 20.0])}, "front_axle_slip_angle_rad")
+    assert np.isnan(shown[0])
+    assert shown[1] == pytest.approx(0.05)

@@ -239,3 +239,9 @@ def test_a_quantity_has_one_slider_and_a_standing_start_none(tmp_path: Path) -> 
     assert sliders["controllers.YawDamper.gain_s"]["label"] == "gain"
     standing = runs.describe(Describe(maneuver="start_stop", controllers=("none",))).header["sliders"]
     assert "speed_kmh" not in {slider["key"] for slider in standing}
+
+
+def test_the_first_patch_of_a_road_is_named_in_words(tmp_path: Path) -> None:
+    described = Runs(Folder(tmp_path)).describe(Describe(maneuver="mu_jump", controllers=("none",)))
+    sliders = {slider["key"]: slider for slider in described.header["sliders"]}
+    assert sliders["road.patches.0.mu"]["label"] == "first road patch: friction coefficient"
