@@ -18,7 +18,7 @@ from activesteer.controllers import controller_spec
 from activesteer.core.conventions import Array, run_looks
 from activesteer.core.files import file_word, write_text
 from activesteer.core.metric_table import SIDESLIP_PEAKS, recorded_metric
-from activesteer.core.units import parameter_label, typeset
+from activesteer.core.units import parameter_label, parameter_title, typeset
 from activesteer.driver import driver_spec
 from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.pages import Page, Section, Table, Text, render_page
@@ -378,8 +378,9 @@ def _violations(found: Tuning) -> Picture:
     shown = np.clip(margins, floor, float(np.max(margins[judged], initial=1e-9)))
     falls = np.maximum([value for _, value in found.fall], floor)
     limits = ((0.0, "violated below"),)
-    runs = [run for run, _ in found.fall]
-    panels = [Panel("runs", "least margin so far [-]", [Curve(runs, falls, marker="o")], limits=limits)]
+    # A stair that ends at the last run.
+    runs = np.repeat([*(run for run, _ in found.fall), found.runs], 2)[1:-1]
+    panels = [Panel("runs", "least margin so far [-]", [Curve(runs, np.repeat(falls, 2))], limits=limits)]
     broken = margins < 0.0
     columns = {key: [trial.values.get(key) for trial in found.trials] for key in found.front[0].values}
     texts = {
@@ -397,9 +398,10 @@ def _violations(found: Tuning) -> Picture:
             if part.any()
         ]
         words = ", ".join(f"{place}: {text}" for place, text in enumerate(texts[key]))
-        panels.append(Panel(f"{key} ({words})" if words else key, "margin [-]", points, limits=limits))
-    title = f"{found.controller}, {found.maneuver}: {found.requirement}"
-    return Picture(title, panels, None, 3, 12.0, 7.0)
+        title = parameter_title(key)
+        panels.append(Panel(f"{title}\n{words}" if words else title, "margin [-]", points, limits=limits))
+    heading = f"{found.controller}, {found.maneuver}: {found.requirement}"
+    return Picture(heading, panels, None, 3, 12.0, 7.0)
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:

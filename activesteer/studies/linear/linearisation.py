@@ -436,7 +436,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
         phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), "", RUN_COLOURS[1], "-", 1.5)
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
         short = quantity_of(output).short
-        panels.append(Panel(below, f"{short}\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, f"{short} gain\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
         panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
     return Picture(label, panels, columns=2, width_in=7.5, height_in=9.0)
 
