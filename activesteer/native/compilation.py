@@ -74,6 +74,12 @@ def inlined(function: Callable[..., Any]) -> Any:
     return njit(inline="always", error_model="numpy")(function)
 
 
+def inlined_by_llvm(function: Callable[..., Any]) -> Any:
+    """Decorator: as `inlined`, for long functions. numba does not copy them into the caller, so they compile faster."""
+    _know_shared()
+    return njit(forceinline=True, error_model="numpy")(function)
+
+
 def _know_shared() -> None:
     """Make the functions that are marked as shared known to compiled code."""
     while MARKED:
@@ -190,13 +196,13 @@ def _cache_of(function: Callable[..., Any], about: tuple[str, Path] | None = Non
 
 @functools.cache
 def _say_compiling() -> None:
-    _LOGGER.info("compiling native code, about 15 s; later starts reuse it")
+    _LOGGER.info("compiling native code, up to a minute; later starts reuse it")
 
 
 @functools.cache
 def _say_uncached() -> None:
     _LOGGER.warning(
-        "there is no writable folder for compiled code, so every start compiles again (about 15 s): "
+        "there is no writable folder for compiled code, so every start compiles again (up to a minute): "
         "set NUMBA_CACHE_DIR to a writable folder"
     )
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from activesteer.config import Range, check_points
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ModelError, ParameterError
-from activesteer.native.compilation import inlined
+from activesteer.native.compilation import inlined, inlined_by_llvm
 from activesteer.native.memory import records_at
 from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.force_block import find, tendon_arms
@@ -408,7 +408,7 @@ def _hardened(record, spring, e0, e1, e2, e3, e4):
     return t * t * (record.square[spring] + t)
 
 
-@inlined
+@inlined_by_llvm
 def add_curve_axle_forces(block, header, qpos, qvel, qfrc):
     """Add the forces of all wheels of curve axles."""
     records = _wheels_at(block, header.curve_axle_wheels, header.n_curve_axle_wheels)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numba import carray, from_dtype, types
 
-from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.compilation import compiled_call, inlined, inlined_by_llvm
 from activesteer.native.memory import f64_pointer, pointer_to
 from activesteer.native.records import numbers_type
 from activesteer.native.shared_laws import shared
@@ -118,7 +118,7 @@ def _exchange(healthy, index, numbers, place, save):
         numbers[place] = healthy[index]
 
 
-@inlined
+@inlined_by_llvm
 def exchange_health(part, block, gain, bias, healthy, save):
     """Save the numbers of a part that faults change, or restore them."""
     places = (part.record + _SCALE, part.record + _OFFSET, part.record + _RATE, part.seized, part.backlash)
@@ -130,7 +130,7 @@ def exchange_health(part, block, gain, bias, healthy, save):
         _exchange(healthy, 5 + _N_GAIN + number, bias, part.actuator * _N_BIAS + number, save)
 
 
-@inlined
+@inlined_by_llvm
 def fail_part(part, block, gain, bias, healthy, kind, offset, held):
     """Write a fault of an actuator into the model, and replace an earlier fault."""
     exchange_health(part, block, gain, bias, healthy, False)
@@ -162,7 +162,7 @@ def fail_part(part, block, gain, bias, healthy, kind, offset, held):
         block[record + _SCALE], block[record + _OFFSET] = 0.0, stop if kind in (RUNAWAY, RUNAWAY_RIGHT) else 0.0
 
 
-@inlined
+@inlined_by_llvm
 def set_fault(part, block, gain, bias, healthy, kind, offset, held):
     """Call `fail_part` by addresses, or save the original numbers if the kind is negative."""
     own = carray(_part_pointer(part), (1,))[0]

@@ -20,7 +20,7 @@ import mujoco
 from numba import carray, config, types
 
 from activesteer.errors import ModelError
-from activesteer.native.compilation import compiled_callback, inlined
+from activesteer.native.compilation import compiled_callback, inlined, inlined_by_llvm
 from activesteer.native.memory import array_at, f64_pointer, records_at, word
 from activesteer.road.native_path import along_path
 from activesteer.road.obstacles import OBSTACLE
@@ -122,7 +122,7 @@ def _back(axes, x, y, z):
     )
 
 
-@inlined
+@inlined_by_llvm
 def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs, qfrc):  # noqa: PLR0915 - one wheel, compiled as one function
     wheels = _wheels_at(block, header.wheels, header.n_wheels)
     tyres = _tyres_at(block, header.tyres, header.n_tyres)
@@ -240,7 +240,7 @@ def _wheels(block, header, timestep_s, xpos, xmat, com, cvel, cdof, act, outputs
         _apply(qfrc, cdof, chain, gx, gy, fz, tx, ty, tz)
 
 
-@inlined
+@inlined_by_llvm
 def _dampers(block, header, ten_velocity, jacobian, userdata, qfrc):
     first_slot = int(header.n_wheels) * fb.USERDATA_PER_WHEEL
     dampers = _dampers_at(block, header.dampers, header.n_dampers)
@@ -254,7 +254,7 @@ def _dampers(block, header, ten_velocity, jacobian, userdata, qfrc):
             qfrc[int(damper.chain[entry])] += jacobian[row + entry] * force
 
 
-@inlined
+@inlined_by_llvm
 def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
     """Add aerodynamic drag, against the velocity of the pressure point in the road plane."""
     body = int(header.chassis_body)

@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import from_dtype, types
 from numba.extending import intrinsic
 
-from activesteer.native.compilation import inlined
+from activesteer.native.compilation import inlined, inlined_by_llvm
 from activesteer.native.memory import f64_pointer, pointer_to
 from activesteer.vehicle.implicit_plan import IMPLICIT_PLAN
 
@@ -69,7 +69,7 @@ def _stiffness(a, b, c, x):
     return max(0.0, a + x * (2.0 * b + x * 3.0 * c))
 
 
-@inlined
+@inlined_by_llvm
 def _assemble(plan):
     """Write the matrix M + h D + h^2 K and the right-hand side f - h K v, in the order of elimination.
 
@@ -132,7 +132,7 @@ def _assemble(plan):
         right[at[index]] -= h * k * rates[which] * gear
 
 
-@inlined
+@inlined_by_llvm
 def _factorise(plan):
     """Factorise in place (unit upper triangular, diagonal), and store the reciprocals of the diagonal."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
@@ -164,7 +164,7 @@ def _warn(plan, bad):
     warning[1] += 1
 
 
-@inlined
+@inlined_by_llvm
 def _solve(plan):
     """Solve for the accelerations with the factor."""
     entries, row, others = f64_pointer(plan.factor), _indices(plan.row), _indices(plan.others)
@@ -185,7 +185,7 @@ def _solve(plan):
         acceleration[dof] = smooth[dof] = x[place_of[dof]]
 
 
-@inlined
+@inlined_by_llvm
 def _accelerate(plan):
     """Compute the sensed accelerations, including gravity, which the engine does not compute again."""
     if plan.sensed_body == 0:
@@ -200,7 +200,7 @@ def _accelerate(plan):
         felt[6 * plan.sensed_body + part] = value
 
 
-@inlined
+@inlined_by_llvm
 def advance(plan):
     """Make one step of the engine."""
     if _engine_must(plan):

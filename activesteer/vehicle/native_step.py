@@ -13,7 +13,7 @@ from numba import carray, from_dtype, types
 
 from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Motion
-from activesteer.native.compilation import compiled_call, inlined
+from activesteer.native.compilation import compiled_call, inlined, inlined_by_llvm
 from activesteer.native.memory import f64_pointer, measurement_pointer, message_pointer, pointer_to
 from activesteer.sensors.block import AX, CHAIN, MEASURED, WHEEL_SPEEDS, measure
 from activesteer.vehicle.brakes.brake_control_unit import step_brakes
@@ -66,7 +66,7 @@ def _all_finite(address, size):
     return not bad
 
 
-@inlined
+@inlined_by_llvm
 def _sense(bindings, measurement_address, motion_address):
     """Write the true `Measurement` and `Motion`, and return whether the state is valid."""
     s = carray(f64_pointer(bindings.sensordata), (bindings.sizes[0],))
@@ -112,7 +112,7 @@ def _copy(source_address, target_address, size):
         target[item] = source[item]
 
 
-@inlined
+@inlined_by_llvm
 def _record(bindings, tape):
     """Copy the recorded arrays onto a tape, and the poses of the bodies when they are due."""
     if tape.room == 0:
@@ -162,7 +162,7 @@ def engage(bindings_address, gear):
     _engage(carray(_bindings_pointer(bindings_address), (1,))[0], gear)
 
 
-@inlined
+@inlined_by_llvm
 def _set_inputs(bindings, commands_address, torques_set):
     """Set the inputs of all actuators of the engine (see `carry_out`)."""
     commands = carray(_command_pointer(commands_address), (1,))[0]
@@ -213,7 +213,7 @@ def _set_inputs(bindings, commands_address, torques_set):
         )  # fmt: skip
 
 
-@inlined
+@inlined_by_llvm
 def carry_out(bindings_address, commands_address, torques_set, measurement_address, motion_address):
     """Carry out the commands, advance the engine by one step, record it and read the sensors.
 

@@ -12,7 +12,7 @@ import pytest
 
 from activesteer.commands.cli import main
 
-COMPILING = "activesteer: compiling native code, about 15 s; later starts reuse it\n"
+COMPILING = "activesteer: compiling native code, up to a minute; later starts reuse it\n"
 
 
 class Told(NamedTuple):
