@@ -154,7 +154,7 @@ def allocated(
 def moment_change(
     block: Allocation, now: Estimate, driver_rad: float, at_rad: tuple[float, float], angle_rad: tuple[float, float]
 ) -> float:
-    """Return the change of the yaw moment from the measured to the allocated angles, by the axle curves [Nm]."""
+    """Return the change of the yaw moment from measured to allocated angles, from the axle curves [Nm]."""
     _, _, front_now, rear_now = axle_forces(block._curves, now, driver_rad + at_rad[0], at_rad[1])
     _, _, front_then, rear_then = axle_forces(block._curves, now, driver_rad + angle_rad[0], angle_rad[1])
     return block._axle_kgm * ((front_then - front_now) - (rear_then - rear_now))

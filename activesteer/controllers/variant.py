@@ -53,7 +53,7 @@ class Variant:
 
     @property
     def files(self) -> dict[str, bytes]:
-        """The file, to be kept with a recording."""
+        """Text of the variant's file, stored in the recording, by path."""
         return {f"controllers/{self.name}.toml": self.source.text.encode()}
 
     @property

@@ -13,7 +13,7 @@ from activesteer.theory.single_track import SingleTrackParameters
 
 @dataclass(frozen=True, kw_only=True)
 class DriverParameters:
-    """Parameters of a driver in any car: steering along a path, and speed control."""
+    """Driver parameters that do not depend on the car: steering along a path, and speed control."""
 
     name: str = ""
     """Short name, for tables. Default: the file's name."""

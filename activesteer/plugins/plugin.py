@@ -165,7 +165,7 @@ class Plugin:
 
     @property
     def uses_truth(self) -> bool:
-        """Flag of a block that requests the true motion: its attribute of this name."""
+        """True if the block sets `uses_truth` to receive the true motion."""
         return bool(getattr(self.origin, "uses_truth", False))
 
     @property

@@ -46,7 +46,7 @@ def _kept(running: Any, before: Any, after: Any, seen: set[int]) -> Any:
 
 
 def _fill(running: Any, before: Any, after: Any, seen: set[int]) -> None:
-    """Transfer the memory of a running object to another one."""
+    """Copy the internal state of a running block to the block with new parameters."""
     old, made, new_state = (_state(block) for block in (running, before, after))
     derived = getattr(type(running), "derived", ())
     new = {name: value for name, value in _kept_parts(old, made, new_state, seen).items() if name not in derived}

@@ -169,7 +169,7 @@ _LONGEST_S: Final = 30.0
 
 
 def steering_wheel_at(runner: StandardRunner, speed_kmh: float, ay_mps2: float) -> float:
-    """Return the angle from a slow ramp to the left at constant speed."""
+    """Return the steering wheel angle at a lateral acceleration, from a slow ramp steer to the left."""
     [run] = runner.drive(
         f"ramp_{speed_kmh:g}kmh",
         "slowly_increasing_steer",

@@ -138,7 +138,7 @@ def mount(axle: str, part: str, carrier: str, kind: AxleKind, points: dict[str, 
 
 
 def _lever(inner: list[Array], outer: Array, foot: Array, along: Array) -> float:
-    """Return the shortening of a spring per travel of the arm's outer joint, at the design position."""
+    """Return the motion ratio of a spring: compression per travel of the arm's outer joint, at the design position."""
     base = inner[0]
     if len(inner) == 1:
         rod = outer - base

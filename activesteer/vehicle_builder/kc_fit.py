@@ -329,7 +329,7 @@ def _loads(axle: str, tests: dict[str, Samples], radius_m: float, in_series: Arr
 
 
 def _rack_compliance(curves: AxleCurves, column_Npm: float) -> Array:
-    """Return the compliance of a wheel by the steering column, with equal loads on both wheels, shape (5, 5)."""
+    """Return the compliance of a wheel due to the steering column, with equal loads on both wheels, shape (5, 5)."""
     rack, over = np.array(curves.rack_m), curves.over_rack()
     near = np.argsort(np.abs(rack))[:5]
     slopes = np.array([np.polyfit(rack[near], row[near], 1)[0] for row in over])

@@ -1,4 +1,4 @@
-"""Trim of the standing car to the height, weight, ride and steering of its table.
+"""Adjust the car at rest to the height, weight, ride and steering in its table.
 
 A measured curve belongs to the loaded axle, the curve of the guide to the unloaded axle. They differ by a few
 hundredths of a degree, the effect of the wheel load at its small lever arms. The curves are corrected by the difference

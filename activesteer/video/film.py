@@ -151,7 +151,7 @@ class Film:
         return np.asarray(start + step * np.arange(int((end - start) / step + 1e-9) + 1), np.float64)
 
     def picture(self, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of a time, shape (height, width, 3)."""
+        """Return the frame at a time, shape (height, width, 3)."""
         drawn = [pane.picture(canvas, time_s) for pane, canvas in zip(self._panes, self._canvases, strict=True)]
         return self._gauges.draw(np.hstack(drawn), time_s)
 

@@ -96,7 +96,7 @@ def setting_of(recording: RecordingLike) -> str:
 
 
 def claims_for(recording: RecordingLike) -> Scenario | None:
-    """Return the scenario of the claims that the manoeuvre of a run checks, or None without such claims."""
+    """Return the scenario whose claims apply to a run, or None if there is none."""
     # The name of its manoeuvre counts, and for the two open-loop manoeuvres also its kind: a user's step steer is a
     # step steer. The paper has no claims about a manoeuvre with other settings, except those of `setting_of`; any car
     # and any duration are judged.

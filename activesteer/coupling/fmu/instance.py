@@ -286,7 +286,7 @@ class IsolatedInstance:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
-        """Return a state that the process has saved as bytes."""
+        """Return the bytes of a state that the FMU's process has saved."""
         return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:

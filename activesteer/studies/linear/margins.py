@@ -12,8 +12,8 @@ the corresponding loss of gain; so does a command held for N steps of the simula
 as in a run. Aliasing from above half the sampling rate is left out.
 
 The disk margin is alpha of the balanced disk, 1 / max |S - 1/2|, S being the sensitivity of the opened loop: the loop
-stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse together with every phase within
-2 atan(alpha / 2). 0.5 are 4.4 dB and 28 deg at once.
+stays stable for every gain from (2 - alpha) / (2 + alpha) to its inverse, for every phase within 2 atan(alpha / 2), and
+for smaller changes of both at once, within the disk. 0.5 are 4.4 dB or 28 deg.
 
 `control.stability_margins` gives gain, phase and delay margins; `control.disk_margins` accepts no frequency
 response. Source: P. Seiler, A. Packard, P. Gahinet, An introduction to disk margins, IEEE Control Systems Magazine 40
@@ -69,7 +69,7 @@ suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
 ASKED_DISK: Final = 0.5
-"""Smallest disk margin that is required of a loop: 4.4 dB together with 28 deg [-]."""
+"""Smallest disk margin that is required of a loop: 4.4 dB or 28 deg, or smaller changes of both at once [-]."""
 BOTH: Final = "both"
 """Name of the loop in which gain, phase or delay change by the same in both demands."""
 
@@ -356,8 +356,10 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
     title = f"Stability margins: {vehicle}"
     least = min(found, key=lambda each: each.margins.disk)
     value = (passed if least.margins.disk >= ASKED_DISK else failed)(f"{least.margins.disk:.2f}")
-    where = f" with {_name(least)}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is required:"
-    lead: list[Text] = [Markup("The smallest disk margin is ") + value + where + " 4.4 dB together with 28 deg."]
+    where = f" with {_name(least)}, at {least.speed_kmh:g} km/h; at least {ASKED_DISK:g} is required"
+    lead: list[Text] = [
+        Markup("The smallest disk margin is ") + value + where + " (a gain of 4.4 dB or a phase of 28 deg)."
+    ]
     if drawn:
         lead.append(_LEAD)
     return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
