@@ -352,8 +352,10 @@ def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0
         header = _headers_at(block, 0, 1)[0]
         count, start = int(header.n_screw_sensors), int(header.screw_sensors)
         # The number of active faults follows them.
-        said = array_at(data, d_userdata, int(header.n_userdata))[-1 - count : -1]
-        array_at(data, d_sensordata, start + count)[start:] = said
+        said, first = array_at(data, d_userdata, int(header.n_userdata)), int(header.n_userdata) - 1 - count
+        sensors = array_at(data, d_sensordata, start + count)
+        for sensor in range(count):  # a slice would compile numba's check of shapes, for a second
+            sensors[start + sensor] = said[first + sensor]
 
     return passive, actuator_rate, screw_sensors
 
