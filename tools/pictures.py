@@ -84,8 +84,13 @@ PANELS_OF: Final[Mapping[str, Sequence[Panel]]] = {
 }  # fmt: skip
 """What shows a manoeuvre better than the general picture: where the car goes straight or stands, that is rounding."""
 
-ENVELOPES: Final = ("slalom", "double_lane_change", "double_lane_change_low_mu")
-"""Manoeuvres with a map of speed and line."""
+_MARGIN: Final = "margin between the sides of the car and the edges of the lane"
+ENVELOPES: Final = {
+    "slalom": ("Slalom", "largest distance of the path from the row of cones"),
+    "double_lane_change": ("Double lane change", _MARGIN),
+    "double_lane_change_low_mu": ("Slippery double lane change", _MARGIN),
+}
+"""Manoeuvre with a map of speed and line -> its title, and what varies over the rows."""
 
 
 def draw_pictures(names: Sequence[str]) -> None:
@@ -332,11 +337,19 @@ def _envelope(name: str) -> Figure:
         if stays:
             passes[row[line], row[speed]].append(row["controller"])
     counts = np.array([[float(len(passes[x, y])) for y in speeds] for x in lines])
-    texts = [["" if len(passes[x, y]) == len(SYSTEMS) else " ".join(passes[x, y]) for y in speeds] for x in lines]
+    words = {"none": "no control"}
+    texts = [
+        [
+            "" if len(found := passes[x, y]) == len(SYSTEMS) else ", ".join(words.get(one, one) for one in found)
+            for y in speeds
+        ]
+        for x in lines
+    ]
     names = [f"{value:g}" for value in speeds], [f"{value:g} m" for value in lines]
     heat = Heat(counts, texts, *names, (0.0, float(len(SYSTEMS))), ("#e6b8af", "#fff2cc", "#d9ead3"), "speed [km/h]")
-    legend = [("all get through", "#d9ead3"), ("none", "#e6b8af")]
-    return draw(Picture(f"{name}: systems that get through", [heat], None, 1, 9.0, 3.6, legend))
+    legend = [("all three cars complete it", "#d9ead3"), ("no car completes it", "#e6b8af")]
+    title, rows = ENVELOPES[name]
+    return draw(Picture(f"{title}; rows: {rows}", [heat], None, 1, 9.0, 3.6, legend))
 
 
 def _draw(kind: str, runs: Mapping[str, Any]) -> Figure:

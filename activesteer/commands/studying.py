@@ -355,7 +355,8 @@ def _modes(options: argparse.Namespace) -> None:
 
         speeds = [speed / 3.6 for speed in _LOCUS_KMH]
         systems = [linear_car(options.vehicle, speed, overrides).state_space() for speed in speeds]
-        pictures = {"bode": bode_picture(label, car.state_space()), "root_locus": root_locus_picture(systems, speeds)}
+        of = f"{options.vehicle} at {label}: answer to the steering wheel angle"
+        pictures = {"bode": bode_picture(of, car.state_space()), "root_locus": root_locus_picture(systems, speeds)}
         page = modes_page(f"{options.vehicle} at {label}", modes, *pictures.values())
         figures = [
             *(save(draw(picture), options.output / f"{name}.png") for name, picture in pictures.items()),

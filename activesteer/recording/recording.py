@@ -117,8 +117,7 @@ class Recording:
             recover: Whether to return the part of a damaged file before the damage.
 
         Raises:
-            RecordingError: the file cannot be opened, is not a recording, or is damaged; the message gives the readable
-            part.
+            RecordingError: the file cannot be opened, is not a recording, or is damaged (with its readable part).
         """
         contents, damage = read_mcap(Path(path))
         if damage and not recover:

@@ -90,7 +90,7 @@ class Gauges:
         for reading in self._readings:
             value = self._text.getlength(_WIDEST.get(reading.channel, "-8.88"))
             name = self._small.getlength(f"{reading.short} {reading.unit.name}")
-            places.append(places[-1] + name + value + 2.8 * self._gap)
+            places.append(places[-1] + name + value + 3.2 * self._gap)
         self._columns = [round(place) for place in places]
         head = min(self._text.getlength(f"888.88 s{self._title}{self._note}") + 6.0 * self._gap, self._size[0])
         return self._row * (self._columns[-1] * len(self._every) + head)
@@ -123,7 +123,7 @@ class Gauges:
             value = reading.value_text(found) if math.isfinite(found) else "-"
             unit_at = end - 2.0 * gap - self._small.getlength(reading.unit.name)
             _write(layer, (x, base), reading.short, _GREY, self._small)
-            _write(layer, (unit_at - 0.3 * gap, base), value, _WHITE, self._text, "rs")
+            _write(layer, (unit_at - 0.7 * gap, base), value, _WHITE, self._text, "rs")
             _write(layer, (unit_at, base), reading.unit.name, _GREY, self._small)
 
 

@@ -190,7 +190,7 @@ class Chart {
       const ends = [...area.x.map((x, i) => [x, area.high[i]]), ...area.x.map((x, i) => [x, area.low[i]]).reverse()];
       for (const [x, y] of ends) if (x != null && y != null) ctx.lineTo(px(x), py(y));
       ctx.closePath();
-      ctx.globalAlpha = area.alpha * (onDark() && area.shade == null ? 0.3 : 1);
+      ctx.globalAlpha = area.alpha * (onDark() && area.shade == null ? 0.45 : 1);
       ctx.fillStyle = area.shade == null ? inkOf(area.colour) : scaleColour(area.shade);
       ctx.fill();
       ctx.globalAlpha = 1;

@@ -365,7 +365,12 @@ def _front(found: Tuning) -> Panel:
         if trials:
             places = np.array([place(trial) for trial in trials])
             curves.append(Curve(places[:, 0], places[:, 1], label, *look))
-    return Panel(f"{x} [-]", f"{y} [-]", curves)
+    better = {
+        "implausibility": "smaller is better",
+        "statements that hold": "more is better",
+        "set": "in the order of the search",
+    }
+    return Panel(*(f"{name} [-], {better.get(name, 'smaller is better')}" for name in (x, y)), curves)
 
 
 def _violations(found: Tuning) -> Picture:
