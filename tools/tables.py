@@ -154,9 +154,10 @@ SLOWEST_MPS: Final = 5.0
 LARGEST_SIDESLIP_RAD: Final = np.radians(8.0)
 """Slower samples, and samples with a larger sideslip angle, do not count."""
 _ESTIMATION_HEAD: Final = (
-    "| | | peak sideslip | error, RMS | error, peak | filter std | speed error, RMS | error, peak | NEES | NIS |",
+    "| | | peak sideslip | error, RMS | error, peak | standard deviation "
+    "| speed error, RMS | error, peak | NEES | NIS |",
     "|---|---|---|---|---|---|---|---|---|---|",
-    "| | | deg | deg | deg | deg | % | % | of 1 | of 2 |",
+    "| | | deg | deg | deg | deg | % | % | expected 1 | expected 2 |",
 )
 
 

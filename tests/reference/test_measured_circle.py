@@ -228,7 +228,7 @@ def test_with_the_settings_of_the_source_the_angle_is_that_of_its_own_model(
 
     Each median is of four samples with 5 % of tyre force and 0.1 m/s2, which vary by up to 2 %, and the method by which
     the source's driver reaches the circle is not published. The differences of all its sets below 7 m/s2 are -6.8 to
-    +5.7 % (docs/measured_cars.md), the worst two among these: 7.5 % notices a changed car, it is no target.
+    +5.7 % (docs/measured_cars_data.md), the worst two among these: 7.5 % notices a changed car, it is no target.
     """
     case = without(changed(file.on_circle, PREDICTION), *KC_OFF)
     case |= {"radius_m": 100.0, "ay_mps2": ay_mps2, "factors.mass": mass_kg / 2374.0}

@@ -19,6 +19,6 @@ def test_the_documentation_lists_the_modules_that_a_run_passes_through() -> None
         lines = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.splitlines()
     found = [line.removeprefix("activesteer.") for line in lines if line.startswith("activesteer.")]
     text = (ROOT / "docs/maintaining.md").read_text(encoding="utf-8")
-    listed = text.partition("## What a run passes through")[2].partition("```text")[2].partition("```")[0].split()
+    listed = text.partition("## Modules of a run")[2].partition("```text")[2].partition("```")[0].split()
     assert found == listed
     assert len(found) <= 64
