@@ -212,7 +212,7 @@ def _fill_heat(axis: Axes, heat: Heat) -> None:
     long = any(len(name) > _LONG_NAME for name in heat.columns)
     axis.set_xticks(range(len(heat.columns)), heat.columns, fontsize="x-small")
     axis.tick_params(axis="x", labelrotation=45.0 if long else 0.0)
-    if not heat.title:
+    if not heat.title and not heat.x_label:
         axis.xaxis.tick_top()
     axis.set_yticks(range(len(heat.rows)), heat.rows, fontsize="x-small")
     axis.set_title(heat.title, fontsize="small")
