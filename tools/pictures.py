@@ -346,7 +346,9 @@ def _envelope(name: str) -> Figure:
         for x in lines
     ]
     names = [f"{value:g}" for value in speeds], [f"{value:g} m" for value in lines]
-    heat = Heat(counts, texts, *names, (0.0, float(len(SYSTEMS))), ("#e6b8af", "#fff2cc", "#d9ead3"), "speed [km/h]")
+    heat = Heat(
+        counts, texts, *names, (0.0, float(len(SYSTEMS))), ("#e6b8af", "#fff2cc", "#d9ead3"), x_label="speed [km/h]"
+    )
     legend = [("all three cars complete it", "#d9ead3"), ("no car completes it", "#e6b8af")]
     title, rows = ENVELOPES[name]
     return draw(Picture(f"{title}; rows: {rows}", [heat], None, 1, 9.0, 3.6, legend))
