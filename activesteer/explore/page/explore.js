@@ -211,9 +211,11 @@ const hear = {
 
 function showComing() {
   if (!state.coming.length) return;
-  for (const [header, arrays] of state.coming.splice(0)) {
+  const coming = state.coming.splice(0);
+  const headers = coming.map(([header]) => header), remarks = [...new Set(headers.map(({ remark }) => remark).filter(Boolean))];
+  $("note").textContent = [headers[0].note, ...remarks.map((remark) => `${headers.filter((header) => header.remark === remark).map(shortName).join(", ")}: ${remark}`)].filter(Boolean).join(" ");
+  for (const [header, arrays] of coming) {
     showTitle(header.title);
-    $("note").textContent = header.note ?? "";
     if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
   }

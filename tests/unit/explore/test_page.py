@@ -162,7 +162,7 @@ def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     page = driven(
         tmp_path,
         f"""const saved = (file) => drive.ended({{ time_s: 3, behind_s: 0, file, folder: "/f", error: "" }});
-        const told = () => $("driven").children[0];
+        const told = () => $("driven").children.map((one) => one.words ?? one).join("").trim();
         {GO} drive.way = "Last lap"; frame({{ lap_s: 1, last_lap_s: 18.57 }});
         key("r"); saved("first.mcap"); ready(); drive.going();
         frame({{ last_lap_s: null }}); key("r"); saved("second.mcap"); ready(); drive.going();
@@ -172,6 +172,19 @@ def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     told = [text.replace("\N{NO-BREAK SPACE}", " ") for text in page["result"]]
     assert told[0].startswith("Before the restart: last lap 18.57 s, saved as first.mcap. 3.0 s driven")
     assert told[1].startswith("3.0 s driven")
+
+
+def test_the_gauges_of_the_end_stay_until_the_next_start_and_a_waiting_car_uses_no_grip(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""globalThis.seen = [];
+        ready(); frame(); seen.push(gauge("grip used"));
+        {GO} frame({{ speed_kmh: 42 }}); seen.push(gauge("grip used"), gauge("speed"));
+        {ENDED} ready(); frame({{ time_s: 0, speed_kmh: 60 }}); seen.push(gauge("speed"));
+        $("start").fire("click"); drive.going(); frame({{ speed_kmh: 60 }}); seen.push(gauge("speed"));
+        {ENDED} drive.control("ars"); ready(); frame({{ speed_kmh: 55 }}); seen.push(gauge("speed"));""",
+    )
+    assert page["result"] == ["\N{EN DASH}", "100 %", "42 km/h", "42 km/h", "60 km/h", "55 km/h"]
 
 
 def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
