@@ -211,14 +211,13 @@ const hear = {
 
 function showComing() {
   if (!state.coming.length) return;
-  const coming = state.coming.splice(0);
-  const headers = coming.map(([header]) => header), remarks = [...new Set(headers.map(({ remark }) => remark).filter(Boolean))];
-  $("note").textContent = [headers[0].note, ...remarks.map((remark) => `${headers.filter((header) => header.remark === remark).map(shortName).join(", ")}: ${remark}`)].filter(Boolean).join(" ");
-  for (const [header, arrays] of coming) {
+  for (const [header, arrays] of state.coming.splice(0)) {
     showTitle(header.title);
     if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
   }
+  const runs = [...state.runs.values()], remarks = [...new Set(runs.map(({ remark }) => remark).filter(Boolean))];
+  $("note").textContent = [runs.at(-1).note, ...remarks.map((remark) => `${runs.filter((run) => run.remark === remark).map(shortName).join(", ")}: ${remark}`)].filter(Boolean).join(" ");
   redraw();
 }
 

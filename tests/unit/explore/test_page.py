@@ -435,6 +435,17 @@ def test_without_a_connection_no_car_is_prepared(tmp_path: Path) -> None:
     assert page["result"] == [told, True, True, False, told]
 
 
+def test_runs_with_the_same_remark_are_named_together(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const id = before.at(-1).id, figures = [], losses = [];
+        for (const [name, remark] of [["none", "slides."], ["ars", ""], ["my.py:Own", "slides."]])
+          hear({ kind: "run", id, name, title: "", note: "The search fails.", remark, figures, losses }, [undefined]);
+        $("saved").textContent = $("note").textContent;""",
+    )
+    assert page["saved"] == "The search fails. none, Own: slides."
+
+
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
     page = used(
         tmp_path,
