@@ -19,6 +19,7 @@ from activesteer.analysis.harm import LOST, losses, shown
 from activesteer.analysis.metrics import key_figures_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
+from activesteer.analysis.series import changed_friction
 from activesteer.analysis.step_response import NOT_FOLLOWED, follows_steering, without_response
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
@@ -277,6 +278,7 @@ class Runs:
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
             drawn = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
+            run["patches_s"] = changed_friction(recording)[0]
             run["losses"] = list(losses(recording.metrics))
             run["remark"] = "" if follows_steering(recording) else NOT_FOLLOWED
             surface: tuple[NDArray[np.float32], ...] = ()

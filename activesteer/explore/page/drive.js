@@ -340,7 +340,7 @@ export class Drive {
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
-    $("gauges").title = "grip used: share of its friction that the busiest tyre uses, straight ahead for the toe of the wheels; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the last lap or of the ghost; missed: a gate was missed" : "");
+    $("gauges").title = "grip used: share of its friction that the busiest tyre uses, straight ahead mostly for its toe; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the last lap or of the ghost; missed: a gate was missed" : "");
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 

@@ -52,6 +52,18 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
     assert ["amplitude as before" in title for title in titles] == [False, True, False]
 
 
+def test_a_run_has_the_times_on_a_slippery_patch(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    (jump, _) = runs.run(RunRequest(maneuver="mu_jump"), lambda: False)
+    ((begin_s, end_s),) = jump.header["patches_s"]
+    recording = activesteer.simulate("mu_jump", "none")
+    on = recording.time_s[recording["fr_mu"] < 0.5]
+    assert begin_s == pytest.approx(on[0], abs=1e-3)
+    assert end_s > on[-1]  # the rear wheels leave it later
+    (step, _) = runs.run(RunRequest(maneuver="step_steer"), lambda: False)
+    assert step.header["patches_s"] == []
+
+
 def test_a_car_that_does_not_follow_a_step_has_no_response_times_and_a_remark(tmp_path: Path) -> None:
     runs = Runs(Folder(tmp_path))
     for values, turns in (({"road.mu": 0.1, "speed_kmh": 160.0}, False), ({}, True)):
