@@ -137,7 +137,7 @@ def _outcome(found: Mapping[str, Any]) -> Markup:
 
 def _told(figure: Mapping[str, Any]) -> Text:
     """Return a key figure with its difference from the first run."""
-    if not figure["difference"]:
+    if figure["difference"] in ("", "0"):
         return figure["text"]
     change: Change = figure["change"]
     difference = f"{_CHANGE_MARK[change]} {figure['difference']}"

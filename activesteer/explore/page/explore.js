@@ -283,7 +283,7 @@ function showFigures() {
     return element("td", {}, now?.lost ? "lost" : number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   const failed = runs.filter((run) => run.losses.length);
-  rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("th", {}, swatchOf(run), `${shortName(run)} fails`), element("td", { colspan: runs.length }, run.losses.join("; ")))));
+  rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("td", { colspan: runs.length + 1 }, swatchOf(run), `${shortName(run)} fails: ${run.losses.join("; ")}`))));
   $("figures").classList.toggle("many", runs.length > 2);
   $("figures").replaceChildren(head, ...rows);
   curves.besides($("figures").parentElement);
@@ -340,8 +340,8 @@ function sliderOf(slider) {
   // A typed value needs no step of the slider.
   shown.addEventListener("change", () => {
     const text = shown.value.replace("−", "-").replace(",", ".").replaceAll("\u202f", ""), value = text.trim() === "" ? NaN : text / factor, { low, high } = slider;
-    if (!Number.isFinite(value)) { write(); return; }
     unhint();
+    if (!Number.isFinite(value)) { write(); if (text.trim()) say(`${slider.label}: ${text} is not a number. The value stays.`, true); return; }
     input.value = Math.min(high, Math.max(low, value));
     if (value < low || value > high) say(`${slider.label} ${text} is outside ${+(low * factor).toPrecision(6)} to ${`${+(high * factor).toPrecision(6)} ${unit}`.trim()}. The nearest value is driven.`, true);
     take(+input.value, false);

@@ -264,7 +264,7 @@ def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tm
     ("83.7", 83.7, "83.7", ""),
     ("83,7", 83.7, "83.7", ""),
     ("900", 160, "160", "speed 900 is outside 20 to 160 km/h"),
-    ("abc", None, "80", ""),
+    ("abc", None, "80", "speed: abc is not a number. The value stays."),
     ("", None, "80", ""),
 ])  # fmt: skip
 def test_a_typed_value_is_driven_as_it_is(
@@ -444,6 +444,18 @@ def test_runs_with_the_same_remark_are_named_together(tmp_path: Path) -> None:
         $("saved").textContent = $("note").textContent;""",
     )
     assert page["saved"] == "The search fails. none, Own: slides."
+
+
+def test_a_failure_has_the_whole_row_of_the_table(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const id = before.at(-1).id, losses = ["misses 2 cones", "hits 1 cone"];
+        hear({ kind: "run", id, name: "none", title: "", figures: [], losses }, [undefined]);
+        hear({ kind: "run", id, name: "ars", title: "", figures: [], losses: [] }, [undefined]);
+        $("saved").textContent = JSON.stringify($("figures").querySelectorAll("td")
+          .map(({ words, attributes }) => [words, attributes.colspan]));""",
+    )
+    assert json.loads(page["saved"]) == [["none fails: misses 2 cones; hits 1 cone", 3]]
 
 
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:
