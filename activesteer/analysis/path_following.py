@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
-from activesteer.analysis.series import Array, counted, lag, largest_rate, rate_rms, rms, sizes, timestep
+from activesteer.analysis.series import counted, lag, largest_rate, rate_rms, rms, sizes, timestep
 from activesteer.analysis.source import RecordingLike, entry, read_course, read_footprint
-from activesteer.core.conventions import CORNERS
+from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.metric_table import CONES_MISSED
 from activesteer.road.course import Course
 
