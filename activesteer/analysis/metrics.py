@@ -32,7 +32,7 @@ from activesteer.analysis.source import Evaluable, RecordingLike
 from activesteer.config import read_toml
 from activesteer.core.conventions import CORNERS
 from activesteer.core.limits import table_of, text
-from activesteer.core.metric_table import metric
+from activesteer.core.metric_table import metric, recorded_metric
 from activesteer.errors import RecordingError, nearest_names
 from activesteer.road.road import road_of
 
@@ -217,6 +217,14 @@ def key_figures_of(names: Collection[str]) -> dict[str, str]:
     """Return the key figures among the metrics of a run: titles and names of metrics."""
     found = {title: next(filter(names.__contains__, of), "") for title, of in KEY_FIGURES.items()}
     return {_ON_A_PATH.get(name, title) if _PATH in names else title: name for title, name in found.items() if name}
+
+
+def label_of(name: str, names: Collection[str]) -> str:
+    """Return the words for a metric among the metrics of a run, as its key figure has them."""
+    if name in _ON_A_PATH and _PATH in names:
+        title = _ON_A_PATH[name].removesuffix(", magnitude")
+        return title[0].lower() + title[1:]
+    return recorded_metric(name).label
 
 
 def evaluated_kind(recording: RecordingLike) -> str:

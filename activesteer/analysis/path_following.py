@@ -8,15 +8,18 @@ car that never reaches the last gate, or a recording that ends within the 3 s.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.analysis import lanes
 from activesteer.analysis.series import counted, lag, largest_rate, rate_rms, rms, sizes, timestep
 from activesteer.analysis.source import RecordingLike, entry, read_course, read_footprint
-from activesteer.core.conventions import CORNERS
+from activesteer.core.conventions import CORNERS, Array
+from activesteer.core.metric_table import CONES_MISSED
 from activesteer.road.course import Course
 
 AFTER_S: Final = 3.0
@@ -139,17 +142,36 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
 
 
 def _slalom(recording: RecordingLike, course: Course) -> dict[str, float]:
-    row = course.cones_m[~course.on_lane_side()]
+    row = course.row_m()
     if not len(row):
-        return {"track_amplitude_m": math.nan, "cone_distance_mean_m": math.nan, "cones_missed": math.nan}
+        return {"track_amplitude_m": math.nan, "cone_distance_mean_m": math.nan, CONES_MISSED: math.nan}
     x = np.linspace(row[:, 0].min(), row[:, 0].max(), 1000)
     y = lanes.track_over_x(recording, x)
-    sides = np.sign(lanes.track_over_x(recording, row[:, 0]) - row[:, 1])
-    asked = np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
     distances = lanes.cone_distances(recording, replace(course, cones_m=row), read_footprint(recording))
     return {
         "track_amplitude_m": 0.5 * float(y.max() - y.min()),
         "cone_distance_mean_m": float(distances.mean()),
-        # A cone that is not reached has side nan, which equals no side.
-        "cones_missed": float(np.count_nonzero(sides != asked)),
+        CONES_MISSED: float(np.count_nonzero(~_on_path_side(recording, course, row))),
     }
+
+
+def _on_path_side(recording: RecordingLike, course: Course, row: Array) -> NDArray[np.bool_]:
+    """Return which cones of a row the car passes on the side of the path."""
+    sides = np.sign(lanes.track_over_x(recording, row[:, 0]) - row[:, 1])
+    # A cone that is not reached has side nan, which equals no side.
+    return sides == np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
+
+
+def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
+    """Return the metrics of a slalom that may have ended early, without those of cones that were not reached."""
+    # Cones passed on the wrong side still count. Without any, nothing says that the car passed all of them.
+    if CONES_MISSED not in metrics:
+        return metrics
+    course = read_course(recording)
+    row = course.row_m()
+    reached = row[:, 0] <= lanes.front_axle(recording)[0].max()
+    if reached.all():
+        return metrics
+    missed = float(np.count_nonzero(~_on_path_side(recording, course, row[reached])))
+    found = {name: value for name, value in metrics.items() if name not in (CONES_MISSED, "cone_distance_mean_m")}
+    return found | ({CONES_MISSED: missed} if missed else {})

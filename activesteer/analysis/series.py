@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.source import RecordingLike
+from activesteer.core.conventions import CORNERS
 from activesteer.errors import RecordingError
 
 Array = NDArray[np.floating]
@@ -60,6 +61,24 @@ def sizes(recording: RecordingLike, channel: str) -> dict[str, float]:
     """Return the metrics of the peak and the root mean square of a channel."""
     name, _, unit = channel.rpartition("_")
     return {**peak(recording, channel), f"{name}_rms_{unit}": rms(counted(recording, channel))}
+
+
+_SAME_FRICTION: Final = 1e-3
+
+
+def changed_friction(recording: RecordingLike) -> tuple[list[tuple[float, float]], tuple[float, float]]:
+    """Return the times when a wheel's friction differs from its initial friction [s], and its least and greatest."""
+    try:
+        mu = np.array([recording[f"{corner}_mu"] for corner in CORNERS])
+    except RecordingError:  # a recording of another program
+        return [], (math.nan, math.nan)
+    changed = np.abs(mu - mu[:, :1]) > _SAME_FRICTION
+    edges = np.flatnonzero(np.diff(changed.any(axis=0).astype(int), prepend=0, append=0)).reshape(-1, 2)
+    if not edges.size:
+        return [], (math.nan, math.nan)
+    time_s = recording.time_s
+    spans_s = [(float(time_s[begin]), float(time_s[end - 1])) for begin, end in edges]
+    return spans_s, (float(mu[changed].min()), float(mu[changed].max()))
 
 
 def smooth(values: Array, timestep_s: float) -> Array:

@@ -11,6 +11,7 @@ Source: 49 CFR 571.126 (FMVSS 126), S7.6 and S7.11; NHTSA TP-126, which gives th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from activesteer.analysis import handling
 from activesteer.analysis.series import Array, crossing_time, largest_rate, low_pass, peak, step_response, timestep
 from activesteer.analysis.sine_with_dwell import MOTION_CUT_OFF_Hz, STEERING_CUT_OFF_Hz
-from activesteer.analysis.source import RecordingLike
+from activesteer.analysis.source import RecordingLike, entry
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import RecordingError
 
@@ -72,6 +73,34 @@ def step_response_metrics(recording: RecordingLike) -> dict[str, float]:
         values[f"{name}_steady_state_{unit}"] = float(np.mean(recording[f"{name}_{unit}"][settled]))
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     return values
+
+
+_FOLLOWED_SHARE: Final = 0.1
+"""Share of the desired yaw rate below which a car does not follow the steering. Chosen."""
+NOT_FOLLOWED: Final = "the car does not follow the steering, so its response has no times and no overshoot."
+"""Explanation of the missing values of a car that does not follow the steering."""
+_OF_THE_RESPONSE: Final = ("_response_time_s", "_peak_time_s", "_overshoot", "tb_srad")
+"""Ends of the names of metrics that describe a response."""
+
+
+def follows_steering(recording: RecordingLike) -> bool:
+    """Return whether a car with a step steer turns at least as `_FOLLOWED_SHARE` of the desired yaw rate asks."""
+    if entry(recording, "maneuver", "kind") != "step_steer":
+        return True
+    try:
+        yaw_rate, desired = recording["yaw_rate_radps"], recording["yaw_rate_desired_radps"]
+    except RecordingError:  # a recording of another program
+        return True
+    settled = recording.time_s >= recording.time_s[-1] - STEADY_WINDOW_S
+    wanted = float(np.mean(desired[settled]))
+    return bool(float(np.mean(yaw_rate[settled])) * math.copysign(1.0, wanted) >= _FOLLOWED_SHARE * abs(wanted))
+
+
+def without_response(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
+    """Return metrics to show: nan for a response to the steering that is none."""
+    if follows_steering(recording):
+        return metrics
+    return {name: math.nan if name.endswith(_OF_THE_RESPONSE) else value for name, value in metrics.items()}
 
 
 def _step_time(time_s: Array, steering_rad: Array) -> float:

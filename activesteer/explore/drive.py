@@ -240,7 +240,7 @@ class DriveSession:
         sideslip_deg = math.degrees(math.atan2(motion.lateral_speed_mps, motion.speed_mps)) if speed_mps > 1.0 else 0.0
         header = {
             "kind": "frame", "time_s": round(simulation.time_s, 3),
-            "speed_kmh": math.copysign(3.6 * speed_mps, motion.speed_mps),
+            "speed_kmh": 3.6 * speed_mps,
             "steering_wheel_deg": math.degrees(loop.measurement.steering_wheel_rad),
             "sideslip_deg": sideslip_deg,
             "yaw_rate_degps": math.degrees(motion.yaw_rate_radps), "ay_mps2": truth["ay_mps2"],
@@ -317,7 +317,14 @@ class DriveSession:
         if self._missed:
             return ", ".join(filter(None, ("no time: a gate was missed", cones)))
         if self._last_lap_s is None:
-            return cones
+            course = self._simulation.scenario.maneuver.course
+            early = ""
+            if course is not None and course.last_gate_x_m is not None:
+                row = course.row_m()
+                count = int(np.sum(row[:, 0] <= self._front_x_m))
+                ended = f"ended after {count} of {len(row)} cones"
+                early = f"no time: {'the last gate was not passed' if count == len(row) else ended}"
+            return ", ".join(filter(None, (early, cones)))
         word = "last lap" if self._course.radius_m else "time"
         return ", ".join(filter(None, (f"{word} {self._last_lap_s + penalty_s:.2f} s", cones)))
 

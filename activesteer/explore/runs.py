@@ -19,6 +19,8 @@ from activesteer.analysis.harm import LOST, losses, shown
 from activesteer.analysis.metrics import key_figures_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import groups_of
+from activesteer.analysis.series import changed_friction
+from activesteer.analysis.step_response import NOT_FOLLOWED, follows_steering, without_response
 from activesteer.config import field_in_unit, is_overruled, leaves, spellings
 from activesteer.controllers import controller_spec, declared_parameters
 from activesteer.core.conventions import CORNERS, run_looks
@@ -30,6 +32,7 @@ from activesteer.drawing.panels import EXPLORE
 from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError
 from activesteer.explore.choice import Folder, check_numbers
 from activesteer.explore.messages import Choice, Describe, RunRequest
+from activesteer.maneuver.base import MIN_SEARCH_SPEED_MPS
 from activesteer.plugins import Declared, Plugin
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
@@ -106,7 +109,9 @@ def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Pa
 
 
 def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float, float]]) -> Iterator[Slider]:
-    for key, (low, high, step) in ranges.items():
+    for key, (least, high, step) in ranges.items():
+        searches = key == "speed_kmh" and scenario.maneuver.search is not None
+        low = max(least, round(3.6 * MIN_SEARCH_SPEED_MPS, 6)) if searches else least
         with suppress(ParameterError):  # not every manoeuvre has every key
             value = value_of(scenario, key)
             # A manoeuvre that begins at rest has its speeds in its phases.
@@ -273,7 +278,9 @@ class Runs:
             self._kept[name] = controller.label, recording
             step_s, poses = poses_of(recording)
             drawn = plots(groups_of({f"{name}.mcap": recording})[0], EXPLORE)
+            run["patches_s"] = changed_friction(recording)[0]
             run["losses"] = list(losses(recording.metrics))
+            run["remark"] = "" if follows_steering(recording) else NOT_FOLLOWED
             surface: tuple[NDArray[np.float32], ...] = ()
             if len(self._kept) == 1 and not choice.dragging:  # all runs have the same road
                 run["ground_m"], surface = surface_of(recording)
@@ -414,11 +421,11 @@ def _plain(name: str) -> str:
 
 def _figures(recording: Recording) -> list[dict[str, Any]]:
     """Return the key figures of a run in display units."""
-    found = []
-    for title, name in key_figures_of(recording.metrics).items():
-        metric, value = recorded_metric(name), float(recording.metrics[name]) * recorded_metric(name).unit.factor
+    found, metrics = [], without_response(recording, recording.metrics)
+    for title, name in key_figures_of(metrics).items():
+        metric, value = recorded_metric(name), float(metrics[name]) * recorded_metric(name).unit.factor
         size = abs(value) if metric.better is Better.SMALLER else value
-        is_lost = shown(name, recording.metrics, "") == LOST
+        is_lost = shown(name, metrics, "") == LOST
         # Times differ by milliseconds, and lengths by millimetres; other values have digits by their size.
         fine = metric.unit_name == "s" or (metric.unit_name == "m" and size < 1.0)
         digits = 0 if metric.whole else 3 if fine else None

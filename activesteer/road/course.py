@@ -61,6 +61,10 @@ class Course:
             return min(lane.start_x_m for lane in self.lanes)
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
+    def row_m(self) -> Array:
+        """Return the cones that mark no lane, as those of a slalom [m], shape (n, 2)."""
+        return self.cones_m[~self.on_lane_side()]
+
     def on_lane_side(self) -> NDArray[np.bool_]:
         """Return the mask of the cones that mark a lane."""
         return self._outward() != 0.0

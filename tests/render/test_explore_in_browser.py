@@ -205,6 +205,10 @@ def test_a_telephone_on_its_side_has_room_for_thumbs(browser: Browser, served: t
     heights = """() => [...document.querySelectorAll("button, select, summary, .check, fieldset label")]
       .filter((part) => part.checkVisibility()).map((part) => part.getBoundingClientRect().height)"""
     assert page.evaluate(f"Math.min(...({heights})())") >= 43.9
+    page.tap("#fold")
+    assert page.evaluate(BOX, "results")["left"] < 20  # without sliders, the results have the whole width
+    assert page.evaluate(BOX, "results")["right"] > 820
+    page.tap("#fold")
     page.evaluate("document.getElementById('curves').scrollIntoView()")
     assert page.evaluate(BOX, "play")["bottom"] <= 390
     assert 0 <= page.evaluate(BOX, "tuning")["top"] < 195

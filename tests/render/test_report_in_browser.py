@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from activesteer import simulate
 from activesteer.analysis.report import write_report
 from activesteer.core.conventions import RUN_COLOURS
 from tests.conftest import PHONE
@@ -133,6 +134,17 @@ def test_plots_show_the_curves_of_all_runs(open_page):
     assert pixels(track, "#f3ead0") > 5000  # lanes
     assert pixels(track, "#d98200") > 50  # cones
     assert "stretched" in track.inner_text()
+
+
+@pytest.mark.slow
+def test_a_course_with_a_turn_is_not_squeezed(browser: Browser, tmp_path: Path):
+    run = simulate("mu_jump", "none")
+    page = browser.new_page(**DESK)
+    page.goto(write_report({"a.mcap": run}, tmp_path / "turn.html").as_uri())
+    page.wait_for_selector(".uplot canvas", state="attached")
+    track = plot(page, "Track of the front axle centre")
+    assert not re.search("stretched|squeezed", track.inner_text())
+    page.close()
 
 
 @pytest.mark.slow

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from activesteer.analysis.harm import LOST_SIDESLIP_RAD
-from activesteer.analysis.series import counted_sideslip
+from activesteer.analysis.series import changed_friction, counted_sideslip
 from activesteer.analysis.sine_with_dwell import END_OF_STEER, marks
 from activesteer.analysis.source import RecordingLike
-from activesteer.core.conventions import CORNERS, RUN_COLOURS, RUN_DASHES, Array, RunLook, run_looks
+from activesteer.core.conventions import RUN_COLOURS, RUN_DASHES, Array, RunLook, run_looks
 from activesteer.core.units import Quantity, quantity_of
 from activesteer.drawing.panels import FIGURE, PANELS, Panel, added_lines, drawn_values, panels_in
 from activesteer.errors import ParameterError, RecordingError
@@ -168,7 +168,6 @@ _SETTLED: Final = 0.05
 """Distance from the last value within which a signal has settled, as a fraction of its range."""
 _SAME_BORDER: Final = 0.002
 """Largest distance between borders of runs that share a line, as a fraction of the time shown."""
-_SAME_FRICTION: Final = 1e-3
 _AFTER_MARK: Final = 0.12
 """Time shown after the last time of a criterion, as a fraction of the time before it."""
 _LETTER_IN: Final = 0.066
@@ -307,18 +306,12 @@ def mark_times(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 def shade_friction(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
     """Shade the times when a wheel's friction differs from its initial friction, once for each run."""
     for curve in drawn:
-        try:
-            mu = np.array([curve.recording[f"{corner}_mu"] for corner in CORNERS])
-        except RecordingError:  # a recording of another program
-            continue
-        changed = np.abs(mu - mu[:, :1]) > _SAME_FRICTION
-        edges = np.flatnonzero(np.diff(changed.any(axis=0).astype(int), prepend=0, append=0))
-        time_s = curve.recording.time_s.tolist()
-        label = friction_label(float(mu[changed].min()), float(mu[changed].max())) if edges.size else ""
-        for begin, end in edges.reshape(-1, 2).tolist():
+        spans_s, frictions = changed_friction(curve.recording)
+        label = friction_label(*frictions) if spans_s else ""
+        for begin_s, end_s in spans_s:
             for axis in axes:
                 axis.axvspan(
-                    time_s[begin], time_s[end - 1], color=PATCH_COLOUR, alpha=1.0 / len(drawn), linewidth=0.0,
+                    begin_s, end_s, color=PATCH_COLOUR, alpha=1.0 / len(drawn), linewidth=0.0,
                     zorder=0, label=label,
                 )  # fmt: skip
 

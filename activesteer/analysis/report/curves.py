@@ -220,6 +220,9 @@ def _course(course: Course, group: Group) -> dict[str, Any]:
     left = all(
         y.min(initial=least) < least - OFF_COURSE_M or y.max(initial=most) > most + OFF_COURSE_M for _, y in tracks
     )
+    # A drive shows all of its way to the gates.
+    by_hand = any(run.by_hand for run in group.runs)
+    start = min([view.x_m[0], *(float(x[0]) for x, _ in tracks if by_hand and x.size)])
     x, y = np.column_stack([*tracks, [view.x_m, view.y_m]])
     return {
         "lanes": [
@@ -231,6 +234,6 @@ def _course(course: Course, group: Group) -> dict[str, Any]:
         ],
         "cone_radius": CONE_RADIUS_M,
         "path": {"x": _rounded(view.path_x_m, 2), "y": _rounded(view.path_y_m, 3)},
-        "view": None if left else {"x": list(view.x_m), "y": [float(low), float(high)]},
+        "view": None if left else {"x": [start, view.x_m[1]], "y": [float(low), float(high)]},
         "whole": {"x": [float(x.min()), float(x.max())], "y": [float(y.min()), float(y.max())]},
     }

@@ -18,7 +18,9 @@ from activesteer.analysis.claims.scorecard import (
     setting_of,
 )
 from activesteer.analysis.harm import failures, kept
+from activesteer.analysis.path_following import as_far_as_driven
 from activesteer.analysis.source import entry
+from activesteer.analysis.step_response import without_response
 from activesteer.core.conventions import SYSTEM_LABELS, RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
@@ -73,6 +75,12 @@ class ReportedRun(NamedTuple):
         """Reason why the run is incomplete, empty for a complete run."""
         metadata = self.recording.metadata
         return "" if metadata.get("complete", True) else str(metadata.get("error", "the run did not end properly"))
+
+    @property
+    def metrics(self) -> Mapping[str, float]:
+        """Metrics to show. Cones that a person has not driven up to are not judged, nor a response that is none."""
+        metrics = without_response(self.recording, self.recording.metrics)
+        return as_far_as_driven(self.recording, metrics) if self.by_hand else metrics
 
     @property
     def by_hand(self) -> bool:

@@ -15,10 +15,11 @@ from markupsafe import Markup
 
 from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
-from activesteer.analysis.metrics import key_figures_of
+from activesteer.analysis.metrics import key_figures_of, label_of
 from activesteer.analysis.report.curves import plots
 from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun, groups_of, judge
 from activesteer.analysis.source import entry
+from activesteer.analysis.step_response import NOT_FOLLOWED, follows_steering
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.config import leaves
 from activesteer.core.conventions import RunLook
@@ -136,7 +137,7 @@ def _outcome(found: Mapping[str, Any]) -> Markup:
 
 def _told(figure: Mapping[str, Any]) -> Text:
     """Return a key figure with its difference from the first run."""
-    if not figure["difference"]:
+    if figure["difference"] in ("", "0"):
         return figure["text"]
     change: Change = figure["change"]
     difference = f"{_CHANGE_MARK[change]} {figure['difference']}"
@@ -181,7 +182,8 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     details = [_claim(item, anchor) for item in card.judged]
     claims = Section("What the paper claims", points=details, level=3, kind="claims")
     told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
-    told += [f"{each[0].upper()}{each[1:]}." for each in notes({run.name: run.recording.metrics for run in group.runs})]
+    told += [f"{each[0].upper()}{each[1:]}." for each in notes({run.name: run.metrics for run in group.runs})]
+    told += [f"{run.name}: {NOT_FOLLOWED}" for run in group.runs if not follows_steering(run.recording)]
     for name, run in zip(names, runs, strict=True):
         if error := run.metadata.get("metrics_error"):
             told.append(f"{name}: no metrics: {error}")
@@ -323,11 +325,11 @@ HEADLINE: Final = "Largest sideslip angle [deg]"
 def results(group: Group) -> list[dict[str, Any]]:
     """Return failures, met requirements and key figures of each run of a group, compared with the first run."""
     chosen = key_figures(group).values()
-    first = group.runs[0].recording.metrics
-    lost = [[*(["incomplete"] if run.problem else []), *losses(run.recording.metrics)] for run in group.runs]
+    first = group.runs[0].metrics
+    lost = [[*(["incomplete"] if run.problem else []), *losses(run.metrics)] for run in group.runs]
     found = []
     for place, run in enumerate(group.runs):
-        metrics = run.recording.metrics
+        metrics = run.metrics
         well = [*kept(metrics)] or (["stays under control"] if any(lost) and not lost[place] else [])
         figures = [_figure(name, metrics, first if place else None) for name in chosen]
         if not (_is_judged(group.runs[0]) and _is_judged(run)):
@@ -338,12 +340,12 @@ def results(group: Group) -> list[dict[str, Any]]:
 
 def _is_judged(run: ReportedRun) -> bool:
     """Return whether differences from a run can be rated: it is complete, and the car is under control."""
-    return not run.problem and is_controlled(run.recording.metrics)
+    return not run.problem and is_controlled(run.metrics)
 
 
 def key_figures(group: Group) -> dict[str, str]:
     """Return the key figures that at least one run has, and their column titles with units."""
-    names = {name for run in group.runs for name, value in run.recording.metrics.items() if math.isfinite(value)}
+    names = {name for run in group.runs for name, value in run.metrics.items() if math.isfinite(value)}
     found = {}
     for title, name in key_figures_of(names).items():
         unit = recorded_metric(name).unit_name
@@ -401,14 +403,14 @@ def changed_parameters(run: ReportedRun) -> str:
 
 def metric_rows(group: Group) -> list[list[Text]]:
     """Return the metrics with units and differences from the first run."""
-    values = [run.recording.metrics for run in group.runs]
+    values = [run.metrics for run in group.runs]
     rows = []
     for name in dict.fromkeys(name for metrics in values for name in metrics):
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]
         cells: list[Text] = [
-            Markup('<span title="{}">{}</span>').format(name, metric.label),
+            Markup('<span title="{}">{}</span>').format(name, label_of(name, values[0])),
             metric.unit_name,
             texts[0],
         ]

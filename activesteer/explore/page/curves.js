@@ -118,6 +118,19 @@ export class Curves {
     ctx.restore();
   }
 
+  // Shade the times when a wheel of a run is on another friction than at the start: the darker, the more runs.
+  patches(u) {
+    const { ctx, bbox } = u, runs = [...this.runs.values()].filter((run) => run.patches_s);
+    ctx.save();
+    ctx.fillStyle = paint("patch");
+    ctx.globalAlpha = 1 / Math.max(runs.length, 1);
+    for (const [from, to] of runs.flatMap((run) => run.patches_s)) {
+      const [left, right] = [from, to].map((time) => Math.min(Math.max(u.valToPos(time, "x", true), bbox.left), bbox.left + bbox.width));
+      ctx.fillRect(left, bbox.top, right - left, bbox.height);
+    }
+    ctx.restore();
+  }
+
   // Borders of phases, and instants of a standard.
   marks(u) {
     const { ctx, bbox } = u;
@@ -180,7 +193,7 @@ export class Curves {
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [{ ...axis(30, " s"), gap: 8 }, axis(50)],
       series: [{}, ...lines.map((line) => ({ stroke: () => runColour(line.place) + (line.ghost ? GHOST : ""), width: line.ghost ? 1.4 : line.dotted ? 1.2 : 2, dash: line.dash, gaps: wideGaps, points: { show: false } }))],
-      hooks: { drawAxes: [(u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], draw: [(u) => this.words(u)], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
+      hooks: { drawAxes: [(u) => this.patches(u), (u) => this.marks(u), ...(title === SLIP ? [(u) => this.shade(u)] : [])], draw: [(u) => this.words(u)], setScale: [(u, key) => { if (key === "x" && u.data?.[0]?.length) this.zoomed(!!zoomOf(u)); }], setCursor: [(u) => {
         const i = u.cursor.idx;
         const valueOf = (line, k) => element("span", { style: `border-bottom: 2px ${line.dotted ? "dotted" : "solid"} ${runColour(line.place)}` }, number(u.data[k + 1][i]));
         shown.values.replaceChildren(...(i == null ? [] : [`${number(u.data[0][i], 2)} s: `, ...lines.flatMap((line, k) => (line.ghost ? [] : [valueOf(line, k), " "]))]));

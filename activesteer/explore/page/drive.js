@@ -150,7 +150,7 @@ export class Drive {
   // Put a car at the start, where it waits for the button. A drive ends.
   prepare() {
     this.say("");
-    this.again = false;
+    this.again = this.kept = false;
     this.startAt(this.start_kmh, this.start_mu); // the speed may have moved during the drive
     history.replaceState(null, "", `#${this.address}`);
     this.ready = false;
@@ -208,7 +208,7 @@ export class Drive {
 
   going() {
     this.running = this.compared = true;
-    this.again = false;
+    this.again = this.kept = false;
     this.fold();
     this.latencies = [];
     $("start").blur();
@@ -286,7 +286,7 @@ export class Drive {
     const dt = this.previous ? time_s - this.previous.time_s : 0;
     scene.follow(["you"], dt ? [(poses[0] - this.previous.x) / dt, (poses[1] - this.previous.y) / dt] : [0, 0]);
     this.previous = { time_s, x: poses[0], y: poses[1] };
-    this.gauges(header);
+    if (this.running || !this.kept) this.gauges(header);
     scene.mark(nextSide(this.course, poses[0]));
     this.showWay(header.last_lap_s != null && !this.rounds ? null : wayBack(this.course, poses[0], poses[1]), poses);
     if (!this.running) return;
@@ -322,7 +322,7 @@ export class Drive {
     this.front ||= header.superposition_deg != null;
     const lap = this.rounds ? header.lap_s : header.last_lap_s ?? header.lap_s, before = (this.rounds && header.last_lap_s) || this.ghost?.lap_s;
     const rows = {
-      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": `${number(Math.min(100, 100 * header.friction_use), 0)} %`,
+      speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": this.running ? `${number(Math.min(100, 100 * header.friction_use), 0)} %` : "–",
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
       "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg ?? 0, 1)}°`,
       "front steer added": `${number(header.superposition_deg ?? 0, 1)}°`, control: header.controller,
@@ -340,7 +340,7 @@ export class Drive {
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";
-    $("gauges").title = "grip used: share of its friction that the busiest tyre uses; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the last lap or of the ghost; missed: a gate was missed" : "");
+    $("gauges").title = "grip used: share of its friction that the busiest tyre uses, straight ahead mostly for its toe; rear steer, front steer added: angles at the wheels; cones: hit, with the time that they add. " + (this.timed ? "time: of this lap, or since the first gate, with the cones; behind the stroke, that of the last lap or of the ghost; missed: a gate was missed" : "");
     $("wheel").firstElementChild.setAttribute("transform", `rotate(${-header.steering_wheel_deg})`);
   }
 
@@ -374,9 +374,11 @@ export class Drive {
     if (!this.again) this.earlier = "";
     else if (lap) this.earlier = `Before the restart: ${this.way.toLowerCase()} ${number(lap, 2)}\u00a0s, saved as ${header.file}. `;
     if (this.shown && this.ready) this.prepare();
+    this.kept = !this.again; // the gauges of the end stay until the next start
     // A small screen has no room for what few want to know.
-    $("driven").replaceChildren(`${earlier}${timed}${number(header.time_s, 1)}\u00a0s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)}\u00a0s behind the clock`}.`, element("span", { class: "more" }, latency),
-      ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`));
+    const result = `${earlier}${timed}`.trim();
+    $("driven").replaceChildren(...(result ? [element("b", {}, result), " "] : []), element("span", { class: "quiet" }, `${number(header.time_s, 1)}\u00a0s driven, ${header.behind_s < 0.05 ? "in real time" : `${number(header.behind_s, 1)}\u00a0s behind the clock`}.`, element("span", { class: "more" }, latency),
+      ` Saved as ${header.file}`, element("span", { class: "more" }, ` in ${header.folder}.`)));
     $("drive-report").hidden = !!header.error;
     if (header.error) this.say(header.error);
     else if (!this.shown) this.say(told, true);

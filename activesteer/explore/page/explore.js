@@ -213,10 +213,11 @@ function showComing() {
   if (!state.coming.length) return;
   for (const [header, arrays] of state.coming.splice(0)) {
     showTitle(header.title);
-    $("note").textContent = header.note ?? "";
     if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
   }
+  const runs = [...state.runs.values()], remarks = [...new Set(runs.map(({ remark }) => remark).filter(Boolean))];
+  $("note").textContent = [runs.at(-1).note, ...remarks.map((remark) => `${runs.filter((run) => run.remark === remark).map(shortName).join(", ")}: ${remark}`)].filter(Boolean).join(" ");
   redraw();
 }
 
@@ -282,7 +283,7 @@ function showFigures() {
     return element("td", {}, now?.lost ? "lost" : number(now?.value, now?.digits), element("span", {}, /[1-9]/.test(shown) ? `${change > 0 ? "+" : ""}${shown}` : ""));
   })));
   const failed = runs.filter((run) => run.losses.length);
-  rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("th", {}, swatchOf(run), `${shortName(run)} fails`), element("td", { colspan: runs.length }, run.losses.join("; ")))));
+  rows.unshift(...failed.map((run) => element("tr", { class: "fails" }, element("td", { colspan: runs.length + 1 }, swatchOf(run), `${shortName(run)} fails: ${run.losses.join("; ")}`))));
   $("figures").classList.toggle("many", runs.length > 2);
   $("figures").replaceChildren(head, ...rows);
   curves.besides($("figures").parentElement);
@@ -339,8 +340,8 @@ function sliderOf(slider) {
   // A typed value needs no step of the slider.
   shown.addEventListener("change", () => {
     const text = shown.value.replace("−", "-").replace(",", ".").replaceAll("\u202f", ""), value = text.trim() === "" ? NaN : text / factor, { low, high } = slider;
-    if (!Number.isFinite(value)) { write(); return; }
     unhint();
+    if (!Number.isFinite(value)) { write(); if (text.trim()) say(`${slider.label}: ${text} is not a number. The value stays.`, true); return; }
     input.value = Math.min(high, Math.max(low, value));
     if (value < low || value > high) say(`${slider.label} ${text} is outside ${+(low * factor).toPrecision(6)} to ${`${+(high * factor).toPrecision(6)} ${unit}`.trim()}. The nearest value is driven.`, true);
     take(+input.value, false);

@@ -221,9 +221,9 @@
     // A track to one scale is no higher than it fills, unless it stands beside plots.
     height(width, printed = false) {
       const tall = 2 * PLOT_HEIGHT + PLOT_HEAD + PLOT_GAP, most = printed ? PRINTED_TRACK_HEIGHT : this.tall ? tall : TRACK_HEIGHT;
-      if (this.data.view || (this.tall && !printed && !NARROW.matches)) return most;
-      const { x, y } = this.limits;
-      return Math.min(most, Math.max(LEAST_TRACK_HEIGHT, 32 + ((width - 64) * (y[1] - y[0])) / (x[1] - x[0])));
+      if (this.tall && !printed && !NARROW.matches) return most;
+      const { x, y } = this.limits, even = 32 + ((width - 64) * (y[1] - y[0])) / (x[1] - x[0]);
+      return this.data.view ? Math.max(most, Math.min(printed ? most : tall, even)) : Math.min(most, Math.max(LEAST_TRACK_HEIGHT, even));
     }
 
     // Coordinates of the corners of the cars, at some instants: the plot shows whole cars.
@@ -240,12 +240,12 @@
       return [low - margin, high + margin];
     }
 
-    // A course is stretched to fill its plot; without one, both directions have the same scale.
+    // A course is stretched sideways to fill its plot, and never squeezed; without one, both directions have the same scale.
     range(u, key) {
       const { x, y } = this.limits;
       const { width, height } = u.bbox;
-      if (this.data.view || !width || !height) return [...this.limits[key]];
-      const scale = Math.max((x[1] - x[0]) / width, (y[1] - y[0]) / height);
+      const along = (x[1] - x[0]) / width, beside = (y[1] - y[0]) / height, scale = Math.max(along, beside);
+      if (!width || !height || (this.data.view && beside <= along)) return [...this.limits[key]];
       const [limits, pixels] = key === "x" ? [x, width] : [y, height];
       const middle = (limits[0] + limits[1]) / 2, half = (scale * pixels) / 2;
       return [middle - half, middle + half];
@@ -275,7 +275,7 @@
       const covers = stretch > MOST_STRETCH;
       const factors = this.data.tracks.find((track) => track.steer)?.car.factors;
       this.note.textContent = [
-        ...(stretch > 1.05 || stretch < 0.95 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : []),
+        ...(stretch > 1.05 ? [`lateral positions stretched ${stretch.toFixed(1)} times`] : stretch < 0.95 ? [`lateral positions squeezed to ${stretch.toFixed(2)} of their size`] : []),
         ...(covers ? ["shaded: width of the bodies"] : []),
         ...(this.data.patches.length ? [`blue: friction ${[...new Set(this.data.patches.map(({ mu }) => mu))].slice(0, 3).join(", ")}`] : []),
         ...new Set(this.data.obstacles.map(({ text }) => `bordered: ${text}`)),

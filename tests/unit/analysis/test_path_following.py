@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.metrics import metrics
-from activesteer.analysis.path_following import path_following_metrics
+from activesteer.analysis.path_following import as_far_as_driven, path_following_metrics
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SLALOM_CONES, SPEED_MPS, along_path, offset_track, slalom
@@ -130,6 +130,16 @@ def test_cones_on_the_wrong_side_or_not_reached_are_missed():
     run.channels["front_axle_y_m"] = -run["front_axle_y_m"]
     assert metrics(run)["cones_missed"] == 5.0
     assert metrics(slalom(1.3, stops_m=90.0))["cones_missed"] == 3.0
+
+
+def test_of_a_drive_that_ended_early_only_the_cones_that_were_reached_are_judged():
+    run = slalom(1.3, stops_m=90.0)
+    values = metrics(run)
+    assert as_far_as_driven(run, values).keys() == values.keys() - {"cones_missed", "cone_distance_mean_m"}
+    run.channels["front_axle_y_m"] = -run["front_axle_y_m"]
+    assert as_far_as_driven(run, metrics(run))["cones_missed"] == 2.0
+    whole = metrics(slalom(1.3))
+    assert as_far_as_driven(slalom(1.3), whole) == whole
 
 
 def test_a_small_amplitude_hits_the_cones():

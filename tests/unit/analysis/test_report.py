@@ -160,6 +160,11 @@ def test_key_figures_are_better_or_worse_only_where_one_could_tell(metric, first
     assert found["none"]["figures"][0]["difference"] == ""
 
 
+def test_an_exact_zero_is_no_difference_to_read():
+    runs = {f"{name}.mcap": recording_of(step_steer(), name, metrics={"cones_hit": 2.0}) for name in ("none", "ars")}
+    assert "\N{ALMOST EQUAL TO} 0" not in Page(report_page(runs)).words
+
+
 def test_titles_of_key_figures_say_what_differs_from_the_metric():
     metrics = {"lane_overstep_m": -0.2, "yaw_rate_after_1750ms_share": -0.4, "heading_end_rad": -0.5}
     groups = through_cones(none=metrics)

@@ -63,6 +63,8 @@ JUDGED = [metric for metric in METRICS.values() if metric.better is not None]
         # No significance is declared: a change of 0 % is none.
         ("steering_wheel_rate_rms_radps", 0.9009, 0.9007, Change.SAME),
         ("steering_wheel_rate_rms_radps", 0.91, 0.90, Change.WORSE),
+        ("heading_end_rad", math.radians(0.245), math.radians(0.160), Change.SAME),
+        ("heading_end_rad", math.radians(0.9), math.radians(-0.2), Change.WORSE),
         ("lane_overstep_m", 0.3, -0.4, Change.WORSE),
         ("entry_speed_mps", 15.0, 14.0, Change.BETTER),
         ("mean_deceleration_mps2", 7.0, 9.0, Change.WORSE),

@@ -112,6 +112,12 @@ def test_files_of_the_folder_are_in_the_lists_and_are_not_executed(tmp_path: Pat
     Folder(tmp_path).check(RunRequest(maneuver="turn.toml", vehicle="vehicles/mine/mine.toml"))
 
 
+def test_the_slider_of_the_speed_begins_where_a_search_for_the_amplitude_can(tmp_path: Path) -> None:
+    for maneuver, low in (("sine_with_dwell", 30.0), ("slalom", 20.0)):
+        found = Runs(Folder(tmp_path)).describe(Describe(maneuver=maneuver)).header["sliders"]
+        assert [slider["low"] for slider in found if slider["key"] == "speed_kmh"] == [low]
+
+
 def test_the_numbers_of_an_own_manoeuvre_have_sliders(tmp_path: Path) -> None:
     (tmp_path / "turn.toml").write_text(OWN_TURN)
     choice = Describe(maneuver="turn.toml")

@@ -162,7 +162,7 @@ def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     page = driven(
         tmp_path,
         f"""const saved = (file) => drive.ended({{ time_s: 3, behind_s: 0, file, folder: "/f", error: "" }});
-        const told = () => $("driven").children[0];
+        const told = () => $("driven").children.map((one) => one.words ?? one).join("").trim();
         {GO} drive.way = "Last lap"; frame({{ lap_s: 1, last_lap_s: 18.57 }});
         key("r"); saved("first.mcap"); ready(); drive.going();
         frame({{ last_lap_s: null }}); key("r"); saved("second.mcap"); ready(); drive.going();
@@ -172,6 +172,19 @@ def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     told = [text.replace("\N{NO-BREAK SPACE}", " ") for text in page["result"]]
     assert told[0].startswith("Before the restart: last lap 18.57 s, saved as first.mcap. 3.0 s driven")
     assert told[1].startswith("3.0 s driven")
+
+
+def test_the_gauges_of_the_end_stay_until_the_next_start_and_a_waiting_car_uses_no_grip(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""globalThis.seen = [];
+        ready(); frame(); seen.push(gauge("grip used"));
+        {GO} frame({{ speed_kmh: 42 }}); seen.push(gauge("grip used"), gauge("speed"));
+        {ENDED} ready(); frame({{ time_s: 0, speed_kmh: 60 }}); seen.push(gauge("speed"));
+        $("start").fire("click"); drive.going(); frame({{ speed_kmh: 60 }}); seen.push(gauge("speed"));
+        {ENDED} drive.control("ars"); ready(); frame({{ speed_kmh: 55 }}); seen.push(gauge("speed"));""",
+    )
+    assert page["result"] == ["\N{EN DASH}", "100 %", "42 km/h", "42 km/h", "60 km/h", "55 km/h"]
 
 
 def test_an_arrow_points_back_to_a_course_that_was_left(tmp_path: Path) -> None:
@@ -251,7 +264,7 @@ def test_the_page_drives_the_newest_value_once_the_runs_in_progress_are_shown(tm
     ("83.7", 83.7, "83.7", ""),
     ("83,7", 83.7, "83.7", ""),
     ("900", 160, "160", "speed 900 is outside 20 to 160 km/h"),
-    ("abc", None, "80", ""),
+    ("abc", None, "80", "speed: abc is not a number. The value stays."),
     ("", None, "80", ""),
 ])  # fmt: skip
 def test_a_typed_value_is_driven_as_it_is(
@@ -420,6 +433,29 @@ def test_without_a_connection_no_car_is_prepared(tmp_path: Path) -> None:
     )
     told = "Cannot drive: no connection"
     assert page["result"] == [told, True, True, False, told]
+
+
+def test_runs_with_the_same_remark_are_named_together(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const id = before.at(-1).id, figures = [], losses = [];
+        for (const [name, remark] of [["none", "slides."], ["ars", ""], ["my.py:Own", "slides."]])
+          hear({ kind: "run", id, name, title: "", note: "The search fails.", remark, figures, losses }, [undefined]);
+        $("saved").textContent = $("note").textContent;""",
+    )
+    assert page["saved"] == "The search fails. none, Own: slides."
+
+
+def test_a_failure_has_the_whole_row_of_the_table(tmp_path: Path) -> None:
+    page = used(
+        tmp_path,
+        """const id = before.at(-1).id, losses = ["misses 2 cones", "hits 1 cone"];
+        hear({ kind: "run", id, name: "none", title: "", figures: [], losses }, [undefined]);
+        hear({ kind: "run", id, name: "ars", title: "", figures: [], losses: [] }, [undefined]);
+        $("saved").textContent = JSON.stringify($("figures").querySelectorAll("td")
+          .map(({ words, attributes }) => [words, attributes.colspan]));""",
+    )
+    assert json.loads(page["saved"]) == [["none fails: misses 2 cones; hits 1 cone", 3]]
 
 
 def test_two_lost_cars_have_no_change_between_them(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.analysis.report.run_page import report_page
 from activesteer.errors import ParameterError
 from activesteer.explore.choice import Folder
 from activesteer.explore.messages import Describe, RunRequest
@@ -48,6 +50,32 @@ def test_a_moving_slider_holds_the_amplitude_and_a_resting_one_searches_it(tmp_p
     assert amplitudes[1] == pytest.approx(amplitudes[0], rel=1e-3)  # the column twists a little
     assert amplitudes[2] < 0.9 * amplitudes[0]  # 0.4 g needs less steering at a higher speed
     assert ["amplitude as before" in title for title in titles] == [False, True, False]
+
+
+def test_a_run_has_the_times_on_a_slippery_patch(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    (jump, _) = runs.run(RunRequest(maneuver="mu_jump"), lambda: False)
+    ((begin_s, end_s),) = jump.header["patches_s"]
+    recording = activesteer.simulate("mu_jump", "none")
+    on = recording.time_s[recording["fr_mu"] < 0.5]
+    assert begin_s == pytest.approx(on[0], abs=1e-3)
+    assert end_s > on[-1]  # the rear wheels leave it later
+    (step, _) = runs.run(RunRequest(maneuver="step_steer"), lambda: False)
+    assert step.header["patches_s"] == []
+
+
+def test_a_car_that_does_not_follow_a_step_has_no_response_times_and_a_remark(tmp_path: Path) -> None:
+    runs = Runs(Folder(tmp_path))
+    for values, turns in (({"road.mu": 0.1, "speed_kmh": 160.0}, False), ({}, True)):
+        (run, _) = runs.run(RunRequest(maneuver="step_steer", values=values), lambda: False)
+        figures = {figure["title"]: figure["value"] for figure in run.header["figures"]}
+        for title in ("Yaw rate response time", "Yaw rate overshoot"):
+            assert (figures[title] is not None) == turns
+        assert figures["Steady-state yaw rate"] is not None
+        assert (run.header["remark"] == "") == turns
+        page = report_page(runs.driven())
+        assert ("does not follow the steering" in page) == (not turns)
+        assert len(re.findall(r"yaw rate overshoot</span>.*?>\N{EN DASH}<", page)) == (not turns)
 
 
 @pytest.mark.parametrize(
