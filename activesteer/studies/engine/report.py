@@ -370,7 +370,8 @@ def _front(found: Tuning) -> Panel:
         "statements that hold": "more is better",
         "set": "in the order of the search",
     }
-    return Panel(*(f"{name} [-], {better.get(name, 'smaller is better')}" for name in (x, y)), curves)
+    x_title, y_title = (f"{name} [-], {better.get(name, 'smaller is better')}" for name in (x, y))
+    return Panel(x_title, y_title, curves)
 
 
 def _violations(found: Tuning) -> Picture:
