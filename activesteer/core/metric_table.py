@@ -22,8 +22,9 @@ SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
 SIDESLIP_RAD: Final = math.radians(0.1)
 """Difference of two sideslip angles, momentary or of an oscillation [rad]: an optical sensor is good to 0.1 deg."""
-HEADING_RAD: Final = math.radians(0.5)
-"""Difference of two headings at the end of a run [rad]: a drift of 0.9 m on 100 m. Chosen."""
+HEADING_RAD: Final = math.radians(0.1)
+"""Difference of two headings at the end of a run [rad]: two satellite antennas on a car measure the heading to 0.1 deg
+(OxTS RT3003, manual)."""
 YAW_RATE_RADPS: Final = math.radians(0.5)
 """Difference of two yaw rates [rad/s]: humans notice 0.6 deg/s of a quick rotation (Grabherr et al. 2008), production
 sensors have 0.1 to 0.2 deg/s of noise."""

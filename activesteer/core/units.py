@@ -183,6 +183,9 @@ class Quantity(NamedTuple):
 
 _FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides", "factors", "load"})
 """Tables that only locate or sort a parameter."""
+_LISTED: Final = re.compile(r"(?P<one>.*?)(?:(?<=ch)es|s) (?P<number>\d+)(?P<rest>.*)")
+"""Words of a key in a list of tables, such as `road patches 0`."""
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 _PARAMETER_WORDS: Final = {
     "mu": "friction coefficient", "cg": "centre of gravity", "ars": "ARS", "afs": "AFS", "lqr": "LQR", "esc": "ESC",
     "tv": "torque vectoring",
@@ -193,7 +196,12 @@ def parameter_label(key: str) -> tuple[str, str]:
     """Return the label and the unit of a parameter, from the words of its key and its tables."""
     stem, unit = split_ending(key)
     *tables, name = stem.split(".")
-    within = " ".join(parameter_words(table) for table in tables if table not in _FILES)
+    words = [parameter_words(table) for table in tables if table not in _FILES]
+    within = " ".join(words)
+    if listed := _LISTED.fullmatch(within):  # `road.patches.0` is the first road patch
+        number = int(listed["number"])
+        rank = _ORDINALS[number] if number < len(_ORDINALS) else f"no. {number + 1}"
+        within = f"{rank} {listed['one']}{listed['rest']}"
     what = parameter_words(name) + (" factor" if tables[-1:] == ["factors"] else "")
     return f"{within}: {what}" if within else what, _POWER.sub(lambda power: "²³⁴⁵"[int(power[0]) - 2], unit.name)
 

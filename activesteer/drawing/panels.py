@@ -9,6 +9,7 @@ import numpy as np
 
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.units import ESTIMATED, MEASURED, DisplayUnit, Quantity, quantity_of
+from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.errors import RecordingError
 
 FIGURE, REPORT, EXPLORE, FILM = "figure", "report", "explore", "film"
@@ -25,8 +26,6 @@ AXLE_SLIP: Final = {f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l", f"{axle[0]}r"
 """Slip angle of an axle -> its wheels. It is their mean by wheel load, so that a lifted wheel has no part."""
 _LEAST_LOAD_N: Final = 1.0
 """Load of a lifted wheel in this mean [N]: an axle in the air has the mean of both."""
-_LEAST_SPEED_MPS: Final = 1.0
-"""Speed below which an axle has no slip angle [m/s]: there, the tyre model gives the deflection of the tyre."""
 
 
 class Channels(Protocol):
@@ -44,7 +43,8 @@ def drawn_values(recording: Channels, channel: str) -> Array:
             [recording[f"{wheel}_{what}"] for wheel in AXLE_SLIP[channel]] for what in ("slip_angle_rad", "tyre_fz_N")
         )
         slip = np.average(slips, axis=0, weights=np.maximum(loads, _LEAST_LOAD_N))
-        stands = np.abs(recording["speed_mps"]) < _LEAST_SPEED_MPS if _holds(recording, "speed_mps") else False
+        # There, the tyre model gives the deflection of the tyre.
+        stands = np.abs(recording["speed_mps"]) < SLOWEST_MPS if _holds(recording, "speed_mps") else False
         return np.where(stands, np.nan, slip)
     values = recording[channel]
     return np.unwrap(values) if channel.endswith("sideslip_rad") else values

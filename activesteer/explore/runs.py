@@ -57,8 +57,6 @@ _MANEUVER: Final = {
     "brake.pedal": (0.0, 1.0, 0.01),
 }
 """Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges suit passenger cars."""
-_LABELS: Final = {"road.patches.0.mu": "first road patch: friction coefficient"}
-"""Labels of sliders whose keys read badly as words."""
 _CAR: Final = {
     "factors.mass": (0.8, 1.4, 0.01),
     "factors.yaw_inertia": (0.7, 1.4, 0.01),
@@ -116,9 +114,7 @@ def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float,
             value = value_of(scenario, key)
             # A manoeuvre that begins at rest has its speeds in its phases.
             if _moves(scenario, key, value) and not (key == "speed_kmh" and value == 0.0):
-                label, unit = parameter_label(key)
-                label = _LABELS.get(key, label)
-                yield Slider(key, label, unit, group, min(low, value), max(high, value), step, value)
+                yield Slider(key, *parameter_label(key), group, min(low, value), max(high, value), step, value)
 
 
 def _of_file(group: str, scenario: Scenario, file: Path) -> Iterator[Slider]:

@@ -50,6 +50,8 @@ def test_values_are_written_with_the_digits_of_their_quantity(channel, value, te
         ("load.cg_height_change_m", "centre of gravity height change [m]"),
         ("vehicle.factors.mass", "mass factor"),
         ("sensors.preset", "sensors: preset"),
+        ("road.patches.0.mu", "first road patch: friction coefficient"),
+        ("phases.11.speed_kmh", "no. 12 phase: speed [km/h]"),
         ("steer.lateral_acceleration_mps2", "steer: lateral acceleration [m/s²]"),
         ("controllers.ars.corrector.derivative_gain_s2", "ARS corrector: derivative gain [s²]"),
     ],
