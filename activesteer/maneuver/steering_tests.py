@@ -54,8 +54,10 @@ class StepSteer(Maneuver, kind="step_steer"):
     """The step."""
 
     def __post_init__(self) -> None:
-        """Check that the step starts before the end of the run."""
+        """Check that the step starts before the end of the run, and the speed of a search for its amplitude."""
         check_begin("steer.start_s", self.steer.start_s, self.duration_s)
+        if self.steer.steering_wheel_rad is None:
+            check_speed(self.speed_mps, "steer.lateral_acceleration_mps2", "steer.steering_wheel_deg")
 
     def setpoint(self, time_s: float) -> Setpoint:
         """Return the steering wheel angle of the ramp (see the base class)."""

@@ -190,8 +190,8 @@ def _steady_turn(scenario: Scenario, probe: StepSteer, wanted: float, timestep_s
     best = min(tried, key=lambda pair: abs(pair[1] - wanted))
     raise ManeuverError(
         f"{probe.name}: no steering wheel angle found that gives {wanted:.3g} m/s2 in the car without control; the "
-        f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2: is the road too slippery "
-        f"(road.mu {probe.road.mu:g})?",
+        f"closest was {np.degrees(best[0]):.1f} deg with {best[1]:.3g} m/s2, at {3.6 * speed:.3g} km/h and road.mu "
+        f"{probe.road.mu:g}",
         value=wanted,
     )
 

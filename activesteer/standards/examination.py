@@ -201,5 +201,5 @@ def _verdict(found: Findings) -> Markup:
     if found.error:
         return Markup('<b class="failed">no result</b>')
     if found.passed is None:
-        return Markup('<span class="quiet">the standard sets no limits</span>')
+        return Markup('<span class="quiet">No limits in the standard</span>')
     return passed("pass", chip=True) if found.passed else failed("fail", chip=True)

@@ -67,3 +67,11 @@ def test_step_without_amplitude_and_aim_is_answered():
 def test_step_after_the_end_is_answered():
     with raises(ManeuverError, file="mine.toml", key="steer.start_s", value=3.0):
         step(steer={"start_s": 3.0})
+
+
+@pytest.mark.parametrize("speed_kmh", [-20, 5])
+def test_a_search_for_the_amplitude_needs_a_speed_and_a_given_amplitude_does_not(speed_kmh):
+    asked = {"steering_wheel_deg": None, "lateral_acceleration_g": 0.4}
+    with raises(ManeuverError, key="speed_kmh"):
+        step(speed_kmh=speed_kmh, steer=asked)
+    assert step(speed_kmh=speed_kmh).speed_mps == pytest.approx(speed_kmh / 3.6)
