@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 MAX_SHOWN: Final = 200
-"""Characters of a value that an error message repeats."""
+"""Largest number of characters of a value in an error message."""
 _MAX_MESSAGE: Final = 1000
-"""Characters of the longest error message. The middle of a longer one is left out."""
+"""Largest number of characters of an error message. The middle of a longer message is left out."""
 _GAP: Final = " ... "
 
 

@@ -85,7 +85,7 @@ def _below(speed: Array, begin: int, level_mps: float) -> int | None:
 
 
 def _allowed(recording: RecordingLike, way: Array, first: int, last: int) -> float:
-    """Return the mean deceleration over the distance that the peak friction of the tyres allows [m/s2]."""
+    """Return the distance-averaged deceleration that the peak friction of the tyres allows [m/s2]."""
     # The peak force of a tyre is its force over the fraction of its friction that it uses.
     part = slice(first, last + 1)
     peaks, loads = np.zeros(last + 1 - first), np.zeros(last + 1 - first)

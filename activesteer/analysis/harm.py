@@ -127,7 +127,7 @@ _STEERED: Final = (
     ("front superposition", "superposition_demand_rad", ("superposition_saturated",)),
 )
 _WORTH_SAYING_S: Final = 0.1
-"""Shorter times at a limit are not named [s]."""
+"""Shortest time at a limit that is reported [s]."""
 NEEDED_DISPLACEMENT_M: Final = 1.83
 """Displacement of a sine with dwell below which a car turns too little [m]; FMVSS 126, S5.2.3."""
 _DEGREE: Final = math.pi / 180.0
@@ -147,7 +147,7 @@ SIZES: Final[dict[str, float | None]] = {
     "heading_open_loop": None,  # heading at the end of a sine with dwell
     "steering": None,  # steering wheel, root mean square
 }
-"""Measure of a run that shall not grow -> growth above which it is harm [SI]; None if it is not counted."""
+"""Growth of each measure above which it counts as harm [SI], or None for a measure that is not counted."""
 
 
 def measured(metrics: Metrics) -> dict[str, float]:
@@ -182,7 +182,7 @@ def measured(metrics: Metrics) -> dict[str, float]:
 
 
 def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
-    """Return the growth of each measure of harm by a controller [SI]."""
+    """Return the growth of each measure of harm that a controller causes [SI]."""
     found, all_before, all_after = {}, measured(without), measured(controlled)
     for name in SIZES:
         if name not in all_before and name not in all_after:

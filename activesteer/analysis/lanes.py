@@ -97,7 +97,7 @@ def _pose(recording: RecordingLike) -> tuple[Array, Array, Array, Array]:
 
 
 _NEAR: Final = 10
-"""Points of a path to either side of the last place of a car in which the search looks: 5 m."""
+"""Number of path points to search on either side of a car's last position: 5 m."""
 
 
 def front_axle(recording: RecordingLike) -> tuple[Array, Array]:

@@ -106,9 +106,9 @@ def _steering(recording: RecordingLike, vehicle: Mapping[str, Any]) -> Iterator[
 SEAT_ASIDE_M: Final = 0.35
 _BUTTERWORTH: Final = math.sqrt(0.5)
 _EVERY: Final = 10
-"""Rows from one look at the place of a wheel to the next: 0.2 m at 20 m/s."""
+"""Rows between two checks of a wheel's position: 0.2 m at 20 m/s."""
 _MARKER: Final = "fl_road_z_m"
-"""A channel of uneven roads only."""
+"""Channel that only recordings of uneven roads have."""
 
 
 def is_uneven(recording: RecordingLike) -> bool:
@@ -198,11 +198,11 @@ EVALUATIONS: Final[dict[str, Callable[[RecordingLike], dict[str, float]]]] = {
     "straight_braking": braking.straight_braking_metrics,
     "measured": measured_metrics,
 }
-"""Kind of manoeuvre -> function from a run to its metrics."""
+"""Functions from a run to its metrics, by kind of manoeuvre."""
 KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
     kind: tuple(_TABLE["key_metrics"].get(kind, _TABLE["key_metrics"]["open_loop"])) for kind in EVALUATIONS
 }
-"""Kind of manoeuvre -> metrics that are printed first and held against the baseline, the most telling first."""
+"""Metrics that are printed first and compared with the baseline, by kind of manoeuvre, most important first."""
 _ON_A_PATH: Final[dict[str, str]] = _TABLE["key_figures"]["titles_on_a_path"]
 _PATH: Final = "track_deviation_max_m"
 _TITLES: Final[dict[str, str]] = _TABLE["key_figures"]["titles"]
@@ -210,7 +210,7 @@ KEY_FIGURES: Final = {
     _TITLES.get(names[0], metric(names[0]).label[0].upper() + metric(names[0]).label[1:]): tuple(names)
     for names in _TABLE["key_figures"]["metrics"]
 }
-"""Title of a key figure -> names of metrics, of which the first one that a run has is shown and named."""
+"""Names of metrics by title of a key figure. The first of these metrics that a run has is shown."""
 
 
 def key_figures_of(names: Collection[str]) -> dict[str, str]:

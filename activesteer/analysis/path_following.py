@@ -163,7 +163,7 @@ def _on_path_side(recording: RecordingLike, course: Course, row: Array) -> NDArr
 
 
 def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
-    """Return the metrics of a slalom that may have ended early, without those of cones that were not reached."""
+    """Return the metrics of a slalom that may have ended early, without the metrics of cones that were not reached."""
     # Cones passed on the wrong side still count. Without any, nothing says that the car passed all of them.
     if CONES_MISSED not in metrics:
         return metrics

@@ -38,7 +38,7 @@ ANY: Final = "controller"
 """Name in a requirement for the controller that is examined."""
 _SIGNS: Final[dict[type, str]] = {ast.LtE: "<=", ast.GtE: ">=", ast.Lt: "<", ast.Gt: ">"}
 _TINY: Final = 1e-12
-"""Margin by which a value at the limit of < or > is beyond it."""
+"""Margin of violation of `<` or `>` for a value exactly at the limit."""
 _LONGEST: Final = 1000
 """Largest number of characters of an expression."""
 
@@ -62,7 +62,7 @@ class EvaluatedRun(NamedTuple):
 
 
 Runs = Mapping[EvaluatedRun, Mapping[str, float | None]]
-"""Place of a run -> its metrics. A metric that the run does not define is None or nan."""
+"""Metrics of each run. A metric that the run does not define is None or nan."""
 
 
 class Names(NamedTuple):
@@ -232,7 +232,7 @@ _FUNCTIONS: Final[dict[str, Callable[[Sequence[float]], float]]] = {
     "min": lambda values: float(np.min(values)), "max": lambda values: float(np.max(values)),
     "abs": lambda values: abs(values[0]),
 }  # fmt: skip
-"""The smallest and the largest value are nan if one of the values is."""
+"""Functions of an expression. `min` and `max` are nan if one of their values is nan."""
 _OPERATORS: Final[dict[type, Callable[[float, float], float]]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: _ratio,
 }  # fmt: skip

@@ -32,7 +32,7 @@ and its sideslip angle is then unrelated to its path."""
 _ALL: Final = slice(None)
 
 PEAK_MARGIN: Final = 0.005
-"""Fraction above the steady-state value below which a maximum is no peak."""
+"""Relative height above the steady-state value from which a maximum counts as a peak."""
 
 
 def counted_sideslip(recording: RecordingLike, part: slice = _ALL) -> Array:
@@ -222,7 +222,7 @@ FAST_RADPS: Final = math.radians(75.0)
 FAST_FOR_S: Final = 0.2
 """Least duration of this rate [s]."""
 THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle whose first passing is the start of steer [rad]. The range ends before it."""
+"""Steering wheel angle that marks the start of steer when it is first exceeded [rad]. The range ends before it."""
 RANGE_S: Final = 1.0
 """Length of the range [s]."""
 _AVERAGED_S: Final = 0.1

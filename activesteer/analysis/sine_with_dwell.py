@@ -42,7 +42,7 @@ MOTION_CUT_OFF_Hz: Final = 6.0
 LONGEST_CREEP_S: Final = 0.1
 """Longest time from the threshold to the centre [s]. A slower wheel creeps, and its line is extrapolated."""
 PEAK_PROMINENCE: Final = 0.02
-"""Least prominence of a peak of the yaw rate, as a fraction of the largest one."""
+"""Least prominence of a peak of the yaw rate, as a fraction of the largest peak."""
 INSTANTS_S: Final = (1.0, 1.75)
 """Times after the completion of steer at which the yaw rate is compared with its peak [s]."""
 END_OF_STEER: Final = "end of steer"

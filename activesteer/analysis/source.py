@@ -55,7 +55,7 @@ class Evaluable:
 
 
 _MAX_VALUE: Final = 1e30
-"""Bound that no channel of a car comes near, and whose square is still finite."""
+"""Bound far above the values of every channel of a car. Its square is still finite."""
 
 
 def entry(recording: RecordingLike, table: str, key: str) -> str:

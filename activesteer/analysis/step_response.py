@@ -31,7 +31,7 @@ MIN_STEP_RAD: Final = math.radians(0.5)
 
 
 SIGNALS: Final = {"yaw_rate_radps": 1e-3, "ay_mps2": 1e-2, "roll_rad": 1e-4, "sideslip_rad": 1e-4}
-"""Channel -> smallest steady-state value for times and overshoot; below it they are meaningless."""
+"""Smallest steady-state value of each channel for which times and overshoot have a meaning."""
 STEADY_CHANNELS: Final = ("steering_wheel_rad", "front_steer_rad", "rear_steer_rad", "superposition_rad")
 """Channels of which only the steady-state value is given."""
 
@@ -84,7 +84,7 @@ _OF_THE_RESPONSE: Final = ("_response_time_s", "_peak_time_s", "_overshoot", "tb
 
 
 def follows_steering(recording: RecordingLike) -> bool:
-    """Return whether a car with a step steer turns at least as `_FOLLOWED_SHARE` of the desired yaw rate asks."""
+    """Return whether the settled yaw rate in a step steer reaches `_FOLLOWED_SHARE` of the desired yaw rate."""
     if entry(recording, "maneuver", "kind") != "step_steer":
         return True
     try:
@@ -97,7 +97,7 @@ def follows_steering(recording: RecordingLike) -> bool:
 
 
 def without_response(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
-    """Return metrics to show: nan for a response to the steering that is none."""
+    """Return the metrics to show, with nan for metrics of the response if the car does not follow the steering."""
     if follows_steering(recording):
         return metrics
     return {name: math.nan if name.endswith(_OF_THE_RESPONSE) else value for name, value in metrics.items()}
@@ -132,7 +132,7 @@ def _step_time(time_s: Array, steering_rad: Array) -> float:
 REFERENCE_MPS2: Final = 0.3 * GRAVITY_MPS2
 """Lateral acceleration at which the angle is A [m/s2]."""
 FIT: Final = (1.0 / 3.0, 1.25)
-"""Range of the line, in fractions of the wanted acceleration: 0.1 to 0.375 g for 0.3 g."""
+"""Range of the line, as fractions of the required acceleration: 0.1 to 0.375 g for 0.3 g."""
 
 
 def slow_ramp_metrics(recording: RecordingLike) -> dict[str, float]:

@@ -13,8 +13,8 @@ from activesteer.core.text_table import text_table, wrapped_line
 from activesteer.core.units import typeset
 
 Paint = Callable[[str, str, float, float, str], str]
-"""Function from label of a run, name of a metric, its value in this and in the first run, and its text to the text
-as shown."""
+"""Function that returns the shown text of a metric. Arguments: label of the run, name, values in this and the first
+run, text."""
 
 _FRICTION_NOTE: Final = (
     "friction utilisation is the force of a tyre relative to its longitudinal and lateral peaks at pure slip; "
@@ -47,8 +47,8 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 _NEAR_SHARE: Final = 0.005
-"""Part of a value below which a difference is written without a percentage: it would be 0 %. It also tells no values
-apart whose metric has no known significance."""
+"""Fraction of a value below which a difference is shown without a percentage, which would be 0 %. Values of a metric
+without a known significance count as equal below this fraction."""
 
 
 class Change(StrEnum):

@@ -13,7 +13,7 @@ from activesteer.errors import MAX_SHOWN, ParameterError, nearest_names
 from activesteer.resources import DEFAULT_DRIVER
 
 Action = Callable[[argparse.Namespace], int | None]
-"""Function of a command. Returns its exit status if this is not 0."""
+"""Function of a command. It returns the exit status, or nothing for 0."""
 _NAME_WIDTH: Final = 12
 SUCCESSORS: Final = {
     "recover": "info FILE.mcap --recover OUT.mcap",
@@ -33,7 +33,7 @@ SUCCESSORS: Final = {
         ("reproduce -c", "reproduce --controller", "reproduce --controllers"), "study side_by_side -o DIR -c CONTROLLER"
     ),
 }
-"""Removed command, or command and option -> its replacement."""
+"""Replacement of each removed command, or of each removed option of a command."""
 
 
 Part = Callable[[Any], object]

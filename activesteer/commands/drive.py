@@ -23,7 +23,7 @@ command: Final = arguments.Group("drive")
 _WIDTH: Final = 25
 """Width of the column of names."""
 _OTHER_FILES: Final = frozenset((".mp4", ".gif", ".rrd", ".csv", ".mat", ".parquet", ".json", ".html", ".png", ".pdf"))
-"""Endings of files of other commands. Such a name for a folder is a mistake."""
+"""Endings of files that other commands write. A folder whose name has such an ending is a mistake."""
 
 
 @command("list", "list manoeuvres, controllers, drivers, cars, studies, standards", arguments.JSON)

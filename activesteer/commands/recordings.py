@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 command: Final = arguments.Group("recordings")
 _CUTAWAY: Final = arguments.flag("--cutaway", "show the suspension through the body")
 _CORNERS: Final = ("fl", "fr", "rl", "rr")
-"""As in `activesteer.core.conventions`, which takes too long to import for `--help`."""
+"""Names of the corners, as in `core.conventions`, which takes too long to import for `--help`."""
 
 
 @command("info", "print the contents of a recording, or repair it",
@@ -86,7 +86,7 @@ def _info(options: argparse.Namespace) -> None:
 
 
 def _driver(recorded: Any) -> str:
-    """Name and parameters of the driver. Recordings of earlier versions hold only the name."""
+    """Return the name and the parameters of the driver. Recordings of earlier versions hold only the name."""
     if not isinstance(recorded, dict):
         return str(recorded)
     numbers = recorded.get("parameters", recorded)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 command: Final = arguments.Group("study")
 _SHOWN_FALLS: Final = 8
-"""Number of improvements that are printed."""
+"""Largest number of improvements that are printed."""
 _LOCUS_KMH: Final = tuple(range(40, 170, 10))
 """Speeds of the root locus [km/h]."""
 _DRIVER_COLUMNS: Final = {
@@ -34,7 +34,7 @@ _DRIVER_COLUMNS: Final = {
     "phase_margin_deg": "margin deg",
     "crossover_rad_s": "crossover rad/s",
 }
-"""Key of a result -> head of its column."""
+"""Heads of the columns, by the keys of a result."""
 _CONTROLLER_COLUMNS: Final = {
     "speed_kmh": "km/h",
     "controller": "controller",
@@ -44,7 +44,7 @@ _CONTROLLER_COLUMNS: Final = {
     "delay_margin_s": "delay s",
     "disk_margin": "disk",
 }
-"""Key of a row -> head of its column."""
+"""Heads of the columns, by the keys of a row."""
 
 
 @command("study", "drive many runs over varied parameters",

@@ -25,7 +25,7 @@ BAD: Final = 31
 KNOWN: Final = 33
 """Colour codes of a terminal: green, red, yellow."""
 _COLOURS: Final = {"passed": GOOD, "FAILED": BAD, "not reproduced": KNOWN}
-"""Verdict -> colour."""
+"""Colour of each verdict."""
 _VERDICT: Final = re.compile(rf"^(\S+ +)({'|'.join(_COLOURS)})\b", re.MULTILINE)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 command: Final = arguments.Group("verify")
 SETTINGS: Final = {"paper": "paper's setting", "literature": "driver from literature"}
-"""As in `activesteer.analysis.claims.scorecard`, which takes too long to import for `--help`."""
+"""Names of the settings, as in `analysis.claims.scorecard`, which takes too long to import for `--help`."""
 
 
 def _setting(name: str) -> str:

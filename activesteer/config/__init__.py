@@ -390,7 +390,7 @@ def build(cls: type[T], table: Mapping[str, Any], source: Source, path: Sequence
 
 
 def _default_of(field: dataclasses.Field[Any]) -> Any:
-    """Default of a field, or None."""
+    """Return the default of a field, or None."""
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return None if field.default is dataclasses.MISSING else field.default

@@ -43,11 +43,12 @@ ACTUATORS: Final = {
     **{f"{corner}_brake": Actuator((f"{corner}_brake",), "Nm") for corner in CORNERS},
     **{f"{MOTOR}{place}": Actuator((f"{MOTOR}{place}",), "Nm") for place in ("front", "rear", *CORNERS)},
 }
-"""Part -> its actuators."""
+"""Actuators of each part."""
 SENSORS: Final = {
     f"{name}_sensor": unit for name, _, unit in (number.name.rpartition("_") for number in numbers_of(Measurement)[1:])
 }
-"""Part -> unit of its signal, as the suffix of a key. They are the signals that a controller gets, except the time."""
+"""Unit of each sensor's signal, as the suffix of a key. Sensors are the signals that a controller receives, except the
+time."""
 
 KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
@@ -58,7 +59,7 @@ KINDS: Final = {
     "delayed": "demand or reading comes late",
     "dropout": "demand or reading is missing and treated as zero",
 }
-"""Kind of fault -> its effect."""
+"""Effect of each kind of fault."""
 
 _SIZES: Final = ("size_rad", "size_radps", "size_mps", "size_mps2", "size_Nm", "size_Pa")
 

@@ -41,7 +41,7 @@ class Controller(Protocol):
 
 
 _UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
-"""Keys of the table [controllers] that set the time of a command and of its arrival."""
+"""Keys of the table [controllers] that set when a command is computed and when it arrives."""
 
 _MAX_ANGLE_RAD: Final = 1.0
 """Largest angle of a command; a larger one is treated as a mistake, such as degrees [rad]."""

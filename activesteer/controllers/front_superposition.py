@@ -27,7 +27,7 @@ class FrontSuperposition(NativeBlock):
 
     reads = ("afs", "desired_yaw_rate")
     rates_radps = MappingProxyType({"superposition": math.radians(13.0)})
-    """A sine of 0.7 Hz, as in FMVSS 126, with 3 deg."""
+    """Actuator rate for a sine of 0.7 Hz (FMVSS 126) with an amplitude of 3 deg [rad/s]."""
     _desired: DesiredYawRate
     _corrector: Corrector
     _limit_rad: float

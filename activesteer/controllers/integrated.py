@@ -66,8 +66,8 @@ from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, 
 from activesteer.errors import ControllerError, not_installed
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
-"""Function from H, f, A, lower and upper to the x that minimises x' H x / 2 + f' x; first the bounds of x,
-then the bounds of A x."""
+"""Function of H, f, A, lower and upper that returns the x that minimises x' H x / 2 + f' x. The bounds are for x, then
+for A x."""
 
 
 def solver() -> Solve:

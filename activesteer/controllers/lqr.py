@@ -83,9 +83,9 @@ SPEEDS_MPS: Final = tuple(SPEED_STEP_MPS * (number + 1) for number in range(14))
 """Speeds at which the gains are computed, evenly spaced [m/s]; outside them the nearest speed counts."""
 STATES: Final = ("yaw_rate", "sideslip", "front", "rear", "superposition", "rear_actuator", "superposition_before",
                  "rear_before")  # fmt: skip
-"""States of the model; the angles in pairs, front before rear."""
+"""States of the model, with angles in pairs, front before rear."""
 BOTH: Final = (True, True)
-"""Both actuators work: superposition, rear steering."""
+"""Flags for two working actuators: superposition, rear steering."""
 _STEADY: Final = 6
 """Number of values of the steady turn in a row of the schedule, before the rows of K."""
 _ROW: Final = _STEADY + 2 * len(STATES)
@@ -97,7 +97,7 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_
 _SAME_RAD: Final = 1e-6
 """Difference of an angle from its demand that does not count as a limit [rad]."""
 _FULL_MPS: Final = 8.0
-"""Speed from which the controller acts fully; below it fades out until `MIN_SPEED_MPS` [m/s]."""
+"""Speed from which the controller acts fully; below it, its action fades out until `MIN_SPEED_MPS` [m/s]."""
 
 
 class Turn(NamedTuple):
@@ -127,7 +127,7 @@ class Lqr(NativeBlock):
     reads = ("lqr", "servos", "estimator")
     compiled_in = "activesteer.controllers.native_lqr"
     rates_radps = MappingProxyType({"rear": math.radians(25.0), "superposition": math.radians(25.0)})
-    """It removes 3 deg within the time in which the car responds, `removal_s`."""
+    """Actuator rates that remove 3 deg within the time in which the car responds, `removal_s` [rad/s]."""
     gains = LqrParameters
     derived = ("_schedule", "_superposition_works", "_rear_works")
     _estimator: Estimator

@@ -38,8 +38,8 @@ class SideslipRearSteerParameters:
     """Gains of the rear steering with a sideslip term (`ars_sideslip`), in addition to [controllers.ars]."""
 
     sideslip_gain: _Gain
-    """Rear angle against the sideslip angle [rad/rad]: share by which the rear axle becomes stiffer against
-    sideslip."""
+    """Rear angle that opposes the sideslip angle, per sideslip angle [rad/rad]: share by which the rear axle becomes
+    stiffer against sideslip."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class YawMomentParameters:
     reference_length_m: _Length
     """Distance over which the desired yaw rate follows the driver [m]."""
     friction_fraction: _Fraction
-    """Fraction of the estimated friction that the desired yaw rate may use [-]; with `tv` a wheel, too."""
+    """Fraction of the estimated friction that the desired yaw rate and, with `tv`, a wheel may use [-]."""
     acceleration_time_s: _Lag
     """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
     acceleration_shortfall_mps2: Annotated[float, Range(0.0, 20.0)]
@@ -123,9 +123,9 @@ class TorqueVectoringParameters(YawMomentParameters):
     """Parameters of the torque vectoring by electric axles (`tv`)."""
 
     least_fraction: _Fraction
-    """Fraction of the friction that stays for the torque in a turn at the limit [-]."""
+    """Fraction of the friction that remains available for the torque in a turn at the limit [-]."""
     full_speed_mps: Annotated[float, Range(2.0, 50.0)]
-    """Speed from which the controller acts fully [m/s]; below it fades out until walking speed."""
+    """Speed from which the controller acts fully [m/s]; below it, its action fades out until walking speed."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class IntegratedParameters:
     brake_threshold_Nm: _Size
     """Missing yaw moment below which the brakes are inactive [Nm]."""
     brake_side_loss: _Fraction
-    """Side force that a fully used tyre loses per brake force [-]."""
+    """Side force that a fully utilised tyre loses per brake force [-]."""
     side_difference_Pa: Annotated[float, Range(0.0, 1e8)]
     """Brake pressure difference between the sides for a car without errors, in addition to the difference that the
     anti-lock system leaves to the driver [Pa]."""
@@ -156,7 +156,8 @@ class IntegratedParameters:
     side_sideslip_rad: _Scale
     """Sideslip error at which this pressure difference is zero [rad]."""
     side_acceleration_mps2: _Scale
-    """Lateral acceleration of a turn at which this pressure difference is zero; it falls from half of it [m/s2]."""
+    """Lateral acceleration of a turn at which this pressure difference is zero. The difference falls from half of this
+    value on [m/s2]."""
     tolerance_rad: _Limit
     """Distance of an actuator from its demand that is tolerated [rad]."""
     window_s: _Lag
@@ -249,21 +250,21 @@ class ControllerParameters:
     afs: FrontSuperpositionParameters = FrontSuperpositionParameters()
     """Active front steering."""
     servos: ServoParameters = ServoParameters()
-    """The actuators as controllers beyond the paper's know them."""
+    """Data of the actuators, for controllers beyond the paper's."""
     ars_sideslip: SideslipRearSteerParameters = field(
         default_factory=partial(file_gains, "ars_sideslip", SideslipRearSteerParameters)
     )
     """Rear steering with a sideslip term."""
     lqr: LqrParameters = field(default_factory=partial(file_gains, "lqr", LqrParameters))
-    """Both axles together."""
+    """State feedback to both axles."""
     esc: EscParameters = field(default_factory=partial(file_gains, "esc", EscParameters))
-    """Single brakes."""
+    """Stability control by individual brakes."""
     integrated: IntegratedParameters = field(default_factory=partial(file_gains, "integrated", IntegratedParameters))
-    """Steering and brakes together."""
+    """Integrated control of steering and brakes."""
     tv: TorqueVectoringParameters = field(default_factory=partial(file_gains, "tv", TorqueVectoringParameters))
     """Torque vectoring."""
     estimator: EstimatorParameters = EstimatorParameters()
-    """Speed, sideslip and friction, for controllers that use an estimator."""
+    """Estimator of speed, sideslip and friction, for controllers that use one."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
     """Time between two calls of a controller, in whole steps of the simulation [s]. Default: the controller's own
     `interval_s`, or every step."""

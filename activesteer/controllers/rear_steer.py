@@ -78,7 +78,7 @@ class RearSteer(NativeBlock):
 
     reads = ("ars", "desired_yaw_rate")
     rates_radps = MappingProxyType({"rear": math.radians(13.0)})
-    """A sine of 0.7 Hz, as in FMVSS 126, with 3 deg."""
+    """Actuator rate for a sine of 0.7 Hz (FMVSS 126) with an amplitude of 3 deg [rad/s]."""
     _desired: DesiredYawRate
     _prediction: RearPrediction
     _corrector: Corrector

@@ -33,8 +33,8 @@ CONTROLLERS: Final[dict[str, type[Any]]] = {
     "integrated": Integrated,
     "tv": TorqueVectoring,
 }
-"""Name -> class."""
+"""Classes of the controllers, by name."""
 WITHOUT_FILE: Final = {name: kind for name, kind in CONTROLLERS.items() if not hasattr(kind, "gains")}
-"""Those whose gains the vehicle file gives."""
+"""Controllers whose gains are in the vehicle file."""
 IN_EXAMPLES: Final = {"mpc": "examples/own_mpc.py:EnvelopeMpc"}
-"""Former name -> example that replaces it."""
+"""Examples that replace former controllers, by the former name."""

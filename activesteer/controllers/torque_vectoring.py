@@ -48,7 +48,7 @@ _FREE_SLIP: Final = 0.03
 _MOST_SLIP: Final = 0.06
 """Slip from which a wheel gets no torque [-]: further slip costs more side force than it gives drive force."""
 _LEAST_RADPS: Final = 1.0
-"""Wheel speed below which a motor's power sets no limit [rad/s]."""
+"""Wheel speed below which the power of a motor sets no limit [rad/s]."""
 
 
 class Range(NamedTuple):

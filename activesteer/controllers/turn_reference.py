@@ -106,8 +106,8 @@ class BorneTurnReference(TurnReference):
 _AVERAGED_S: Final = 0.2
 """Time constant of the mean of the squared innovations [s]: some twenty samples."""
 _EXPLAINED, _UNEXPLAINED = 8.0, 16.0
-"""Mean squared innovation, over its covariance, up to which the model explains the car, and from which it does not [-].
-Two measured values give 2 on average; the largest mean in 14 ordinary runs was 4.7."""
+"""Mean squared innovation, divided by its covariance, up to which the model explains the car, and from which it does
+not [-]. Two measured values give 2 on average; the largest mean in 14 ordinary runs was 4.7."""
 _FALL_S, _RISE_S = 0.3, 2.0
 """Times in which the authority falls from 1 to 0, and rises again [s]."""
 

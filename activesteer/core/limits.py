@@ -37,7 +37,7 @@ MAX_CRG_BYTES: Final = 20_000_000
 MAX_CRG_POINTS: Final = 4_000_000
 MAX_CRG_COLUMNS: Final = 10_000
 MAX_CRG_FILES: Final = 4
-"""Files that refer to each other."""
+"""Largest number of files that refer to each other."""
 
 # FMU.
 MAX_FMU_BYTES: Final = 256_000_000

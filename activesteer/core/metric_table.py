@@ -16,12 +16,12 @@ from activesteer.core.units import DisplayUnit, display_unit
 from activesteer.errors import ParameterError, nearest_names
 
 STEER_RAD: Final = math.radians(0.05)
-"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to about 3 minutes of arc. A
-demand counts as `claims.judge` says, so that noise cannot pass for it."""
+"""Angle of a road wheel that is turned or added [rad]: workshops set wheel alignment to about 3 minutes of arc.
+`claims.judge` defines when a demand counts, so that noise does not."""
 SETTLED_SIDESLIP_RAD: Final = math.radians(0.05)
 """Difference of sideslip angles averaged over a second [rad]: half of the +-0.1 deg of an optical sensor."""
 SIDESLIP_RAD: Final = math.radians(0.1)
-"""Difference of two sideslip angles, momentary or of an oscillation [rad]: an optical sensor is good to 0.1 deg."""
+"""Difference of two sideslip angles, momentary or of an oscillation [rad]: an optical sensor is accurate to 0.1 deg."""
 HEADING_RAD: Final = math.radians(0.1)
 """Difference of two headings at the end of a run [rad]: two satellite antennas on a car measure the heading to 0.1 deg
 (OxTS RT3003, manual)."""
@@ -33,11 +33,12 @@ TIME_S: Final = 0.01
 TRACK_M: Final = 0.05
 """Difference of two tracks [m]: differential satellite positioning gives each track to 0.02 m."""
 STEERING_WHEEL_RAD: Final = math.radians(5.0)
-"""Difference of two steering wheel angles [rad]: about what a driver can tell apart while turning the wheel."""
+"""Difference of two steering wheel angles [rad]: about the smallest difference that a driver notices while turning the
+wheel."""
 
 FRICTION_UTILISATION: Final = ("friction_utilisation_max", "friction_utilisation_mean")
 RENAMED: Final = {f"tyre_use_{end}": f"friction_utilisation_{end}" for end in ("max", "mean")}
-"""Former name of a metric -> its name."""
+"""Current names of renamed metrics, by the former name."""
 CONES_HIT: Final = "cones_hit"
 CONES_MISSED: Final = "cones_missed"
 LANE_OVERSTEP: Final = "lane_overstep_m"
@@ -51,7 +52,7 @@ class Better(StrEnum):
 
     SMALLER = "smaller in magnitude"
     LOWER = "lower"
-    """For values with a sign: a lane that is not touched has an overstep below zero."""
+    """Lower values are better, also below zero: a lane that is not touched has a negative overstep."""
     HIGHER = "higher"
 
 
@@ -115,7 +116,7 @@ _QUANTITIES: Final = {
     "added_rear_steer": "added rear steer angle",
     "added_superposition": "added superposition angle",
 }
-"""Quantity in names of metrics -> its words, if they differ."""
+"""Words of quantities in names of metrics, where they differ from the name."""
 _ENDS: Final = {
     "_after_gates_rms": "{} after the gates, RMS",
     "_gates_rms": "{} between the gates, RMS",
@@ -134,7 +135,7 @@ _ENDS: Final = {
     "_min": "least {}",
     "_mean": "mean {}",
 }
-"""End of a name -> label with the quantity; the first that fits counts."""
+"""Labels by the end of a name, with a place for the quantity. The first end that fits counts."""
 _LABELS: Final = {
     "tb": "TB factor",
     "steering_wheel_at_0_3g": "steering wheel angle at 0.3 g",
@@ -165,7 +166,7 @@ _LABELS: Final = {
     "added_angles_opposite_share": "added angles of opposite sign",
     "added_angles_correlation": "correlation of the added angles",
 }
-"""Name without unit -> label, where the rules above give no good one."""
+"""Labels of names without unit for which the rules above give no good label."""
 _PERCENT: Final = DisplayUnit("%", 100.0)
 
 
@@ -289,7 +290,7 @@ METRICS: Final = {
         *_declare("", STAYS_IN_LANES, form=Form.YES_OR_NO),
     )
 }  # fmt: skip
-"""Name -> metric."""
+"""All metrics by name."""
 
 
 def metric(name: str) -> Metric:

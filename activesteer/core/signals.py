@@ -28,10 +28,11 @@ class _Make(Protocol):
 
 
 new_message: Final = cast(_Make, tuple.__new__)
-"""`new_message(Motion, (x_m, ...))` takes half the time of `Motion(x_m, ...)`. It needs a value for every field."""
+"""Fast creation of messages: `new_message(Motion, (x_m, ...))` takes half the time of `Motion(x_m, ...)`. It needs a
+value for every field."""
 
 CORNERS_IN_WORDS: Final = dict(zip(CORNERS, ("front left", "front right", "rear left", "rear right"), strict=True))
-"""Corner -> its name in a sentence."""
+"""Names of the corners in a sentence."""
 PerWheel: TypeAlias = tuple[float, float, float, float]
 """One number for each wheel, in the order of `CORNERS`."""
 

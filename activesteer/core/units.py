@@ -115,7 +115,7 @@ EDGE_UNITS: Final = {
     f"_{ending}": (f"_{si}", _BY_ENDING[ending].factor)
     for ending, si in (("deg", "rad"), ("degps", "radps"), ("kmh", "mps"), ("g", "mps2"))
 }
-"""Ending of a key in a file -> ending of the field that it fills, and factor."""
+"""Ending and factor of the field that a key in a file fills, by the ending of the key."""
 
 
 def find_unit(name: str, *, any_case: bool = False) -> Unit | None:
@@ -182,7 +182,7 @@ class Quantity(NamedTuple):
 
 
 _FILES: Final = frozenset({"maneuver", "vehicle", "controllers", "overrides", "factors", "load"})
-"""Tables that only locate or sort a parameter."""
+"""Tables whose names are left out of the words for a parameter."""
 _LISTED: Final = re.compile(r"(?P<one>.*?)(?:(?<=ch)es|s) (?P<number>\d+)(?P<rest>.*)")
 """Words of a key in a list of tables, such as `road patches 0`."""
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")

@@ -21,12 +21,12 @@ and two spare numbers."""
 COMMAND_MAGIC: Final = b"ASC1"
 STATE_MAGIC: Final = b"ASS1"
 DRIVES, CONTROLS, RESTARTS = 1, 2, 4
-"""Flags of a command: the driver's numbers count, the controller's numbers count, the numbering restarts."""
+"""Flags of a command: use the driver's numbers, use the controller's numbers, restart the numbering."""
 TIMED_OUT: Final = 1
 """Flag of a state: no command is in use."""
 REACTIONS: Final = ("release", "hold", "stop")
 _MOST_WAITING: Final = 1000
-"""Messages read in one step at most."""
+"""Largest number of messages read in one step."""
 
 
 class UdpPort(NamedTuple):

@@ -60,8 +60,8 @@ def share_seen(apart_m: Array | float) -> Array:
 SLOWEST_MPS: Final = 1.0
 """Speed below which the direction is kept [m/s]. The direction of a car at rest is not defined."""
 _STEADY_S: Final = 0.35
-"""Standard deviation of the window over which the direction is averaged [s]. The camera follows a bend, but no quick
-motion, which therefore stays visible."""
+"""Standard deviation of the window over which the direction is averaged [s]. The camera follows a bend but no quick
+motion, so quick motion stays visible."""
 
 
 def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> Array:

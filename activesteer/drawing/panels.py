@@ -21,11 +21,11 @@ _OF_CORNERS: Final[dict[str, str]] = dict(zip(CORNERS, ("#56b4e9", "#e69f00", "#
 CORNER_WORDS: Final = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 _GREY: Final = "#a6a6a6"
 PATH_DISTANCE: Final = "path_distance_m"
-"""The only line that needs more than recorded channels: views that know the course derive it."""
+"""Name of the only line that needs more than recorded channels. Views that know the course derive it."""
 AXLE_SLIP: Final = {f"{axle}_axle_slip_angle_rad": (f"{axle[0]}l", f"{axle[0]}r") for axle in ("front", "rear")}
-"""Slip angle of an axle -> its wheels. It is their mean by wheel load, so that a lifted wheel has no part."""
+"""Wheels of each axle's slip angle. It is the mean of the wheels by wheel load, so that a lifted wheel has no part."""
 _LEAST_LOAD_N: Final = 1.0
-"""Load of a lifted wheel in this mean [N]: an axle in the air has the mean of both."""
+"""Load of a lifted wheel in this mean [N]. An axle in the air then has the mean of both wheels."""
 
 
 class Channels(Protocol):
@@ -163,7 +163,7 @@ PANELS: Final = {
     "longitudinal_force": _of_wheels("tyre_fx_N"),
     "brake_pressure": _of_wheels("brake_pressure_Pa", demanded=True),
 }  # fmt: skip
-"""Panel by name."""
+"""Panels by name."""
 
 VIEWS: Final = {
     FIGURE: ("steering_wheel", "yaw_rate", "added", "lateral", "sideslip", "roll", "speed"),

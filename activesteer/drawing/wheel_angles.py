@@ -29,7 +29,7 @@ _BESIDE_M: Final = 0.4
 _WHEEL_M: Final = 0.36, 0.13
 """Half length and half width of a wheel in plan view [m]."""
 _NOTHING_RAD: Final = math.radians(0.05)
-"""Least angle that is written [rad]."""
+"""Smallest angle that a label gives [rad]."""
 
 
 def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:

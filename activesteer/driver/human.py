@@ -52,7 +52,7 @@ class HumanDriver(NativeBlock):
         self._path = PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s)
 
     def prepare(self, speed_mps: float) -> int:
-        """Compute the gains on a path at a speed for compiled code, and return their number.
+        """Compute the gains on a path at a speed for compiled code, and return how many there are.
 
         Raises:
             SimulationDiverged: the speed is implausibly high.
@@ -103,9 +103,9 @@ _MOTION_SPEED: Final = Motion._fields.index("speed_mps")
 
 
 _WINDOW: Final = 250
-"""Steps whose setpoints are tabulated at a time."""
+"""Number of steps whose setpoints are tabulated together."""
 _MAX_TABLES: Final = 64
-"""Tables that are kept for cars that share a manoeuvre."""
+"""Largest number of tables that are kept for cars that share a manoeuvre."""
 
 
 class SetpointTable(NamedTuple):

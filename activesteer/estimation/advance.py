@@ -53,31 +53,34 @@ from activesteer.native.compilation import compiled, inlined
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the current time [s]."""
 _USED_FRACTION: Final = 0.85
-"""Lower bound of the friction, as a fraction of the acceleration over the largest one that the tyres allow on the road
-of their files. The largest of these, forgotten with `friction_s`, over this fraction is an upper bound beyond the
-assumed friction: only forces that need a higher friction show one. Without it, front wheels that reach snow before the
-rear ones were explained by more friction."""
+"""Factor of both bounds of the friction. The lower bound is this fraction of the used friction: the acceleration,
+relative to the largest one that the tyres allow on the road of their files. The upper bound is the largest used
+friction, forgotten with `friction_s`, divided by this fraction, or the assumed friction if that is greater: only forces
+that need a higher friction show one. Without it, front wheels that reach snow before the rear ones were explained by
+more friction."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
 _EXPLAINED: Final = 1.5
 _UNEXPLAINED: Final = 6.0
-"""The squared errors over their covariances, minus the first number, are summed up, and the sum is never below 0. Above
-the second number the car has met another road. In ordinary runs these errors are 0.3 to 0.9 on average, since the
-covariances include errors that last; where wheels reach snow they are 2 to 5 for 0.1 s. Of 6, 10 and 16, chosen by the
-share of the samples with the true friction inside two deviations, on 112 recordings (comparison, seed 9)."""
+"""The squared errors over their covariances, minus the first number, are summed up, and the sum is never below 0. If
+the sum exceeds the second number, the car has reached another road. In ordinary runs these errors are 0.3 to 0.9 on
+average, since the covariances include errors that last. Where wheels reach snow they are 2 to 5 for 0.1 s. The second
+number was chosen from 6, 10 and 16 by the share of the samples with the true friction inside two deviations, on 112
+recordings (comparison, seed 9)."""
 _SHOWING_MPS2: Final = 2.0
 """Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2].
 With 1 m/s2 a curve with a bank of 4 deg was mistaken for snow."""
 _SHOWING_USED: Final = 0.5
-"""Fraction of the assumed friction from which errors show that it is wrong, where this is less: a filter that was sure
-of ice stayed lost for a second. The first value that was tried."""
+"""Fraction of the friction in the filter from which errors show that this friction is wrong, if this limit is below
+`_SHOWING_MPS2`. Without it, a filter that was sure of ice stayed lost for a second. The first value that was tried."""
 _SLIDING_SLIP: Final = 0.05
 _SLIDING_USED: Final = 0.95
 _SLIDING_MPS2: Final = 1.0
 """Slip of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow; fraction of the friction that a car with
 sliding wheels uses; least deceleration [m/s2]."""
 _ALIKE: Final = 0.6
-"""Ratio of the used friction of both sides below which the road has two frictions, and no number is right for both."""
+"""Ratio of the used friction of both sides below which the road has two frictions, so that no number is right for
+both."""
 
 
 @inlined

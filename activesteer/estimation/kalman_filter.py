@@ -85,18 +85,18 @@ _SURPRISING: Final = 4.0
 accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
 offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by 0.1."""
 _NEW_RATIO_STD: Final = 0.3
-"""Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth
-of a second one axle stands on the old one. Of 0.1, 0.2 and 0.3, chosen by the error of the sideslip angle."""
+"""Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth of a
+second one axle is still on the old one. Chosen from 0.1, 0.2 and 0.3 by the error of the sideslip angle."""
 SLIDING_S: Final = 0.3
 """Time for which a wheel that has slid counts as sliding, and duration of the error of the friction that it shows [s]:
 three cycles of the anti-lock system."""
 _SLIDING_STD: Final = 0.15
 """Relative standard deviation of this friction. In braked turns with an anti-lock system, the wheels of two cars used
-83 to 101 % of theirs (median over a run)."""
+83 to 101 % of their friction (median over a run)."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
-"""Spectral density of its yaw acceleration [rad2/s3]: 0.5 rad/s2 for 0.1 s, when brakes stop the car."""
+"""Spectral density of the yaw acceleration of such a car [rad2/s3]: 0.5 rad/s2 for 0.1 s, when brakes stop the car."""
 
 
 @compiled

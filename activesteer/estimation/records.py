@@ -87,7 +87,7 @@ KNOWN: Final = np.dtype(
         ],
     )
 )  # fmt: skip
-"""Knowledge of an estimator; see `known_of`."""
+"""Record of the properties and parameters that an estimator knows (see `known_of`)."""
 
 _OFFSET_S: Final = 100.0
 """Time constant of the offset of the lateral accelerometer [s]: longer than any manoeuvre."""

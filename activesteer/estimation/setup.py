@@ -24,7 +24,7 @@ class EstimatorParameters:
     """Slip angle that the front axle loses per roll angle [rad/rad]. From a K&C test: `roll_understeer`, plus
     (1 + `roll_camber`) times the camber stiffness of the tyre over its cornering stiffness."""
     rear_roll_steer: Annotated[float, Range(-2.0, 2.0)] = 0.0
-    """The same of the rear axle [rad/rad], with `roll_understeer` subtracted: the rear wheels then steer into the turn
+    """The same for the rear axle [rad/rad], with `roll_understeer` subtracted: the rear wheels then steer into the turn
     and gain slip angle."""
 
     friction: Annotated[float, Range(0.05, 1.5)] = 0.9
@@ -46,15 +46,15 @@ class EstimatorParameters:
     """Slip angle error per slip angle: camber, combined slip, curves that are not similar."""
     slip_angle_braking_s2radpm: _NotNegative = math.radians(0.5) / GRAVITY_MPS2
     """Slip angle error per longitudinal acceleration [rad s2/m]: 0.5 deg per g. Dive and brake forces change the toe of
-    the wheels of four cars by 0.03 to 1.5 deg per g, 0.55 deg on average. On a split road the wheel with more grip
-    decides."""
+    the wheels of four cars by 0.03 to 1.5 deg per g, 0.55 deg on average. On a road with split friction the wheel with
+    more grip decides."""
     stiffness_std: _Positive = 0.2
     """Standard deviation of the stiffness of the tyres of an axle, relative to new tyres under the known load: wear,
     temperature, winter tyres, load."""
     stiffness_s: _Positive = 100.0
     """Time constant with which the stiffness returns to the stiffness of new tyres [s]."""
     slip_angle_s: _Positive = 1.0
-    """Time constant of the slip angle error [s]."""
+    """Time constant of the slip angle error of an axle [s]."""
     bank_std_mps2: _Positive = 0.3
     """Standard deviation of the gravity across an inclined road [m/s2]: 3 %. By the guideline RAS-L (1995), roads fall
     by 2.5 % across, and curves by 8 % at most."""
@@ -72,7 +72,7 @@ class EstimatorParameters:
     """Duration of the force error [s]: between the lags of tyres, 0.02 s, and body, 1/(2 pi 2.2 Hz) = 0.07 s. From
     0.0125 to 0.2 s the RMS error of the sideslip changes by no more than 0.03 deg in any scenario."""
     along_fraction: _NotNegative = 0.2
-    """Standard deviation of the longitudinal force of a wheel, per force: brake pads, roads of two sides."""
+    """Standard deviation of the longitudinal force of a wheel, per force: brake pads, split friction."""
     rate_fraction: _NotNegative = 0.005
     """Standard deviation of the yaw rate per value, in addition to its noise: the sensor leans with the body."""
     ay_fraction: _NotNegative = 0.02

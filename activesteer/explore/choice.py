@@ -31,11 +31,11 @@ _OWN: Final = {
     "maneuvers": _TABLE, "vehicles": rf"(vehicles/(?!\.)[^/\\]+/)?{_TABLE}", "drivers": f"{_TABLE}|{_CODE}",
     "controllers": f"{_TABLE}|{_CODE}",
 }  # fmt: skip
-"""List -> form of a name in the folder; `vehicles/NAME/` is where `activesteer vehicle new` puts a car."""
+"""Forms of the names in the folder, by list. `vehicles/NAME/` is where `activesteer vehicle new` puts a car."""
 _TELLING: Final = {"mjcf": "vehicles", "preview_s": "drivers", "system": "controllers"}
-"""Key of a file -> list to which the file belongs. Manoeuvres have a `kind`."""
+"""Lists to which a file belongs, by a key of the file. Manoeuvres have a `kind`."""
 _ARGUMENTS: Final = {3: "controllers", 4: "drivers"}
-"""Number of arguments of a method `step`, with `self` -> list to which its class belongs."""
+"""Lists to which a class belongs, by the number of arguments of its method `step`, with `self`."""
 
 
 class Folder:

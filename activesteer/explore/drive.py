@@ -83,7 +83,7 @@ COURSES: Final = {
         vehicle="bmw_m8",
     ),
 }
-"""Name -> place to drive."""
+"""Courses by name."""
 
 
 class HandDriver:

@@ -56,7 +56,7 @@ _MANEUVER: Final = {
     "cones.offset_m": (0.5, 4.0, 0.05),
     "brake.pedal": (0.0, 1.0, 0.01),
 }
-"""Key of a manoeuvre -> least and greatest value, and step, of its slider. The ranges suit passenger cars."""
+"""Smallest and largest value and step of each slider, by key of a manoeuvre. The ranges suit passenger cars."""
 _CAR: Final = {
     "factors.mass": (0.8, 1.4, 0.01),
     "factors.yaw_inertia": (0.7, 1.4, 0.01),
@@ -75,7 +75,7 @@ _TIMES: Final = 4.0
 """Greatest value of the slider of a gain, in multiples of its current value."""
 _STEPS: Final = 200
 _COVERED: Final = ("controllers", "single_track", "two_track")
-"""Tables of a vehicle that controllers read; the controllers declare what they take from them."""
+"""Tables of a vehicle that controllers read; the controllers declare which keys they use."""
 
 
 class Slider(NamedTuple):
@@ -212,7 +212,7 @@ def surface_of(recording: Recording) -> tuple[float, tuple[NDArray[np.float32], 
 
 
 _CHUNK: Final = 500
-"""Steps between two looks for a newer choice; about 10 ms."""
+"""Steps between two checks for a newer choice; about 10 ms."""
 
 
 class Reply(NamedTuple):
@@ -380,7 +380,7 @@ class Runs:
 
 
 _SEARCHED: Final = {"steer": "steering_wheel", "turn": "steering_wheel", "": "reference_angle"}
-"""Table of a manoeuvre, or none -> key of the steering wheel angle that a search finds, without its unit."""
+"""Keys of the steering wheel angles that a search finds, without their unit, by table of a manoeuvre, or none."""
 
 
 def _fixed_amplitude(scenario: Scenario, overrides: Mapping[str, float]) -> tuple[dict[str, float], str]:

@@ -27,7 +27,7 @@ ACTUATORS: Final[dict[str, tuple[tuple[str, float, float], ...]]] = {
     "front": (("superposition_demand_rad", -1.0, math.radians(3.0)),),
     "brakes": tuple((f"{corner}_brake_torque_demand_Nm", 0.0, 1500.0) for corner in ("fl", "fr", "rl", "rr")),
 }
-"""Actuators of a controller -> number of the action, its lower bound, and the command at its upper bound 1."""
+"""Number of the action, its lower bound, and the command at its upper bound 1, by actuators of a controller."""
 HANDS: Final = (
     ("steering_wheel_demand_rad", -1.0, 2.0 * math.pi),
     ("drive_torque_demand_Nm", -1.0, 2500.0),
@@ -85,7 +85,7 @@ TASKS: Final[dict[str, Task]] = {
         sideslip_rad=-math.radians(25.0),
     ),
 }
-"""Name of an environment -> its task."""
+"""Tasks by name of the environment."""
 
 
 def sampled_overrides(task: Task, vehicle: Any, count: int, seed: int) -> list[dict[str, Any]]:
@@ -131,12 +131,12 @@ _ROAD: Final = (
     *((f"path_left_{ahead:g}s_m", -100.0, 100.0) for ahead in _AHEAD_S),
 )
 _DISTANCES_M, _DISTANCES_S = np.array([0.0, 0.1, *(0.0 for _ in _AHEAD_S)]), np.array([0.0, 0.0, *_AHEAD_S])
-"""Points of the path that are looked at: distances [m], and times at the current speed [s]."""
+"""Points of the path in an observation: distances [m], and times at the current speed [s]."""
 _WINDOW_M: Final = 5.0
 _ENDS: Final = ("", "time", "off course", "lost", "stopped", "diverged")
 _END_NAMES: Final = np.array(_ENDS, dtype=object)
 _SIDESLIP_RAD, _RATE_RADPS, _OFFSET_M = math.radians(5.0), math.radians(10.0), 1.0
-"""Errors that cost as much as each other."""
+"""Errors of equal cost."""
 _SLOW_MPS: Final = 2.0
 """Below this speed there is no sideslip angle, and a drift has ended [m/s]."""
 _MOST_AY_MPS2: Final = 8.0

@@ -22,14 +22,14 @@ from activesteer.road.road import Road
 Speed = Annotated[float, Range(-20.0, 100.0)]
 Side = Literal["left", "right"]
 SIGNS: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
-"""Side -> sign of y, of steering and of yaw there (ISO 8855)."""
+"""Sign of y, of steering and of yaw on each side (ISO 8855)."""
 DriveMode = Literal["hold_speed", "coast"]
 
 MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
 """Below this speed the lateral acceleration hardly depends on the steering wheel angle [m/s]."""
 
 KINDS: Final[dict[str, type[Maneuver]]] = {}
-"""Value of `kind` in a file -> class. A class enters itself: `class StepSteer(Maneuver, kind="step_steer")`."""
+"""Classes by value of `kind` in a file. A class registers itself: `class StepSteer(Maneuver, kind="step_steer")`."""
 
 
 class NamedFile(NamedTuple):
@@ -63,7 +63,7 @@ class Maneuver(ABC):
     name: str = ""
     """Short name, for files and tables. Default: the file's name."""
     title: str = ""
-    """One line for lists and plots."""
+    """Title in one line, for lists and plots."""
     speed_mps: Speed
     """Speed at the start [m/s]."""
     duration_s: Annotated[float, Range(0.01, 3600.0)]
@@ -71,7 +71,7 @@ class Maneuver(ABC):
     settle_s: Annotated[float, Range(0.0, 60.0)] = 2.0
     """Time before the recording in which the car drives straight ahead and its speed settles [s]."""
     road: Road = Road()
-    """The road."""
+    """Road of the manoeuvre."""
     fault: tuple[Fault, ...] = ()
     """Faults of actuators and sensors, and their times."""
 

@@ -49,9 +49,9 @@ class BrakeInTurn(Maneuver, kind="brake_in_turn"):
     """A turn at constant speed and steering wheel angle, then braking."""
 
     turn: TurnInput
-    """The entry of the turn."""
+    """Entry of the turn."""
     brake: BrakeInput
-    """The brake."""
+    """Brake pedal input."""
 
     def __post_init__(self) -> None:
         """Check that turn and brake follow each other within the run."""
@@ -101,9 +101,9 @@ class StraightBraking(Maneuver, kind="straight_braking"):
     """Driving straight ahead, then braking to rest with an open clutch."""
 
     brake: BrakeInput
-    """The brake."""
+    """Brake pedal input."""
     hold_line: bool = True
-    """Whether the driver keeps the car on a straight line. Otherwise the steering wheel is held straight."""
+    """True if the driver keeps the car on a straight line. Otherwise the steering wheel is held straight."""
 
     def __post_init__(self) -> None:
         """Check that the car drives forwards and brakes within the run."""

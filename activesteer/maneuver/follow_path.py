@@ -23,15 +23,16 @@ from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
 
 _WINDOW_M: Final = 5.0
-"""Distance to either side of the last place in which the car is looked for [m]. So a path may cross itself."""
+"""Distance along the path to either side of the car's last position in which its position is searched [m]. A path may
+therefore cross itself."""
 _COAST_MPS2: Final = 0.7
 """Deceleration that drag and engine give without the brake [m/s2]."""
 _PEDAL_PER_MPS2: Final = 1.0 / 13.0
 """Pedal over deceleration of a typical car [s2/m]: 0.38 gives 5 m/s2 in `brake_in_turn`."""
 _PEDAL_PER_MPS: Final = 0.08
-"""Pedal over the speed that is too high [s/m]."""
+"""Pedal position per excess speed [s/m]."""
 _FREE_MPS: Final = 0.3
-"""Speed above the demand that calls for no brake [m/s]."""
+"""Excess speed up to which no brake is needed [m/s]."""
 
 
 COLUMNS: Final = ("x_m", "y_m")
@@ -50,7 +51,7 @@ _MIN_RADIUS_M: Final = 6.0
 _MAX_START_M: Final = 1.0
 """Largest distance of the first point from the car [m]."""
 _MAX_START_RAD: Final = math.radians(15.0)
-"""Largest angle of the first section to the car's heading [rad]."""
+"""Largest angle between the first section and the car's heading [rad]."""
 
 
 def check_points(x_m: Sequence[float], y_m: Sequence[float], place: Callable[[int], str]) -> None:
@@ -144,8 +145,8 @@ class PathTable:
     """Points in the order of travel, from (0, 0) along x."""
 
     csv: str | None = None
-    """CSV file with the columns x_m and y_m, and speed_mps (or speed_kmh) and width_m if wanted: a path, or a name in
-    the manoeuvre's folder."""
+    """CSV file with the columns x_m and y_m, and, optionally, speed_mps (or speed_kmh) and width_m: a path, or a name
+    in the manoeuvre's folder."""
     x_m: tuple[float, ...] | None = None
     """World x of the points [m]. Default: the points of the CSV."""
     y_m: tuple[float, ...] | None = None
@@ -153,7 +154,7 @@ class PathTable:
     speed_mps: Annotated[tuple[float, ...] | None, Range(1.0, 100.0)] = None
     """Speeds at the points [m/s], linear along the path between them. Default: the speed of the manoeuvre."""
     width_m: Annotated[tuple[float, ...] | None, Range(1.0, 100.0)] = None
-    """Widths of the road at the points [m], the path in its middle; for evaluation."""
+    """Widths of the road at the points [m], with the path in the middle; for evaluation."""
 
     def __post_init__(self) -> None:
         """Check that the points form a path."""
@@ -171,7 +172,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
     """A path through given points."""
 
     path: PathTable
-    """The points."""
+    """Points of the path."""
 
     FILES: ClassVar = (NamedFile(("path", "csv"), (*COLUMNS, *OPTIONAL), _read_points, "path"),)
 
@@ -215,7 +216,7 @@ class ConstantRadius(Maneuver, kind="constant_radius"):
     """A circle at a slowly rising speed."""
 
     circle: Circle = Circle()
-    """The circle."""
+    """Circle, and speed on it."""
 
     def __post_init__(self) -> None:
         """Check that a car can drive the circle and that its speed rises."""

@@ -146,7 +146,7 @@ def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
 
 
 _DEGREE: Final = 5
-"""Without active bounds the path of least jerk is a quintic polynomial."""
+"""Degree of the splines: without active bounds, the path of least jerk is a quintic polynomial."""
 _KNOT_SPACING_M: Final = 2.0
 """Distance of the knots [m]. Halving it changes the paths of ISO 3888 by less than 1 cm."""
 _INCOMPATIBLE: Final = 1e-9
@@ -264,7 +264,7 @@ class LaneChange(AlongCourse, kind="lane_change"):
     """A double lane change."""
 
     lane: LaneLayout = LaneLayout()
-    """The lanes."""
+    """Lanes, and the path through them."""
     vehicle_width_m: Width | None = None
     """Width of the vehicle, for which the lanes are laid out [m]. Default: the width in the vehicle file."""
 
@@ -378,7 +378,7 @@ class Slalom(AlongCourse, kind="slalom"):
     """
 
     cones: ConeRow = ConeRow()
-    """The cones."""
+    """Row of cones, and the path past it."""
     vehicle_width_m: Width | None = None
     """Width of the vehicle, which must fit past the cones [m]. Default: the width in the vehicle file."""
 

@@ -180,8 +180,8 @@ class OpenLoop(Maneuver, kind="open_loop"):
     sensor_offset: SensorOffsetTable = SensorOffsetTable()
     """Offsets of these sensors, which `fit` and `compare` add to the motion."""
     hold_last: bool = False
-    """Whether steering or wheel torques that end before `duration_s` keep their last value. A single value always
-    does."""
+    """True to keep the last value of steering or wheel torques that end before `duration_s`. A single value is always
+    kept."""
 
     FILES: ClassVar = tuple(
         NamedFile((key,), (fills,), partial(_read, fills, columns), "tables")

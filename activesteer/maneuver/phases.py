@@ -101,11 +101,12 @@ class Phase:
     name: str
     """Name, for the events in the recording."""
     steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """Steering wheel angle at its end, positive in the direction of the manoeuvre [rad]."""
+    """Steering wheel angle at the end of the phase, positive in the direction of the manoeuvre [rad]."""
     steering_factor: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """The same as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control [-]."""
+    """This angle as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control
+    [-]."""
     steering_rate_radps: Annotated[float, Range(0.01, 40.0)] | None = None
-    """Rate of the steering wheel [rad/s]. Default: 500 deg/s, or as `steering_time_s` says."""
+    """Rate of the steering wheel [rad/s]. Default: 500 deg/s, or by `steering_time_s`."""
     steering_time_s: _Ramp | None = None
     """Time in which the steering wheel turns, instead of a rate [s]."""
     speed_mps: Speed | None = None
@@ -113,7 +114,7 @@ class Phase:
     acceleration_mps2: Annotated[float, Range(0.01, 20.0)] | None = None
     """Acceleration to that speed [m/s2]. Default: the speed is demanded at once."""
     drive: DriveMode | None = None
-    """`hold_speed`, the default of the first phase, or `coast`. Without drive while the brake is pressed."""
+    """`hold_speed`, the default of the first phase, or `coast`. The drive is off while the brake is pressed."""
     brake_pedal: _Pedal | None = None
     """Brake pedal, 0 to 1."""
     brake_time_s: _Ramp = 0.1
@@ -144,7 +145,7 @@ class Phases(Maneuver, kind="phases"):
     """Successive phases, the last of which lasts until the end of the run."""
 
     phases: tuple[Phase, ...]
-    """The phases."""
+    """Phases in the order of the run."""
     repeat: Annotated[int, Range(1, 1000)] = 1
     """Number of times that the phases are driven."""
     direction: Side = "left"

@@ -22,14 +22,16 @@ from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
 
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
-"""Channels that align the clocks if both runs have them: the response of another car may lag, its input may not."""
+"""Channels that align the clocks if both runs have them: the response of another car may lag, but its input does
+not."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 _SEEN: Final = 1e-3
-"""Noise, relative to the tolerance, below which a table leaves it out."""
+"""Noise relative to the tolerance below which a table leaves the noise out."""
 _STEP_S: Final = 0.01
 """Step of the search [s]. The result is found between its sample times."""
 _NEARLY: Final = 0.01
-"""Among shifts this close to the best correlation, such as all periods of a sine, the shortest one is taken."""
+"""Range of correlations below the best one that count as equal, such as all periods of a sine. The shortest of these
+shifts is taken."""
 
 
 def time_shift(measured: Recording, simulated: Recording) -> float:
@@ -123,8 +125,8 @@ FILTERS: Final[dict[str, Filter | None]] = {
     "fmvss126": Filter(12, 10.0, 6.0, "FMVSS 126, UN R140: 12 poles"),
     "none": None,
 }
-"""Name -> filter. ISO 15037-1 requires a filter of fourth order or higher with -3 dB at 9 Hz or above, and at most
-0.5 % of error up to 5 Hz: this one has -3 dB at 9.05 Hz and 0.36 % at 5 Hz."""
+"""Filters by name. ISO 15037-1 requires a filter of fourth order or higher with -3 dB at 9 Hz or above, and at most 0.5
+% of error up to 5 Hz: this one has -3 dB at 9.05 Hz and 0.36 % at 5 Hz."""
 
 
 def smooth(recording: Recording, channel: str, chosen: Filter | None) -> tuple[Array, float]:
@@ -186,7 +188,7 @@ TOLERANCES: Final = {
     "roll_rad": Tolerance(0.2 * _DEG, 0.1, _ASSUMED),
     "speed_mps": Tolerance(1.0 / 3.6, 0.01, _ASSUMED),
 }
-"""Channel that is compared -> its tolerance."""
+"""Tolerance of each compared channel."""
 
 
 class Compared(NamedTuple):

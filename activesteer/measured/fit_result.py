@@ -19,10 +19,11 @@ LEVEL: Final = 0.95
 _WINDOW: Final = 5.0
 """The autocorrelation is summed over this multiple of the resulting time (Sokal, 1997). Beyond, it is noise."""
 _SAME: Final = 2e-3
-"""Parameters are the same to the recordings if a combination of them changes all differences by at most this fraction
-of their single effects. Their correlation is then 0.999996, which differences of runs cannot distinguish from 1."""
+"""Limit for parameters that the recordings cannot tell apart: a combination of them changes all differences by at most
+this fraction of their single effects. Their correlation is then 0.999996, which differences of runs cannot distinguish
+from 1."""
 _IN_IT: Final = 0.2
-"""Proportion from which a parameter belongs to such a combination."""
+"""Proportion from which a parameter counts as a part of such a combination."""
 _TOO_LITTLE: Final = 0.5
 """Smallest effect of a parameter's whole range on all differences together, relative to the noise. With less, the
 standard deviation would be twice the range."""
@@ -106,7 +107,7 @@ _ALIKE: Final = 0.95
 _MUCH: Final = 1.5
 """Residual of a channel relative to its noise above which the car does not explain the channel."""
 _CONSTANT: Final = 0.8
-"""Part of the mean square of a residual from which its mean stands for it."""
+"""Fraction of the mean square of a residual from which its mean counts as a constant offset."""
 _HANGS: Final = 5.0
 """Number of samples per independent sample above which a note is given. Filtered noise of a test vehicle, about 20 Hz,
 has 2 at 100 Hz."""

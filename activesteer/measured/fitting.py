@@ -37,16 +37,16 @@ class FitTable:
     """Table [fit] of a study file."""
 
     noise: dict[str, Annotated[float, Range(1e-12)]]
-    """Channel -> standard deviation of its noise, in the unit of the key, such as `yaw_rate_degps`; the scale of its
+    """Standard deviation of the noise of each channel, in the unit of the key, such as `yaw_rate_degps`. It scales the
     differences."""
     start: dict[str, float] = field(default_factory=dict)
-    """Factor -> start of the search; by default the value of the files, or the middle of the range."""
+    """Start of the search for each factor; by default the value of the files, or the middle of the range."""
     from_s: float | None = None
     """Start of the compared part of the recordings [s]. Inputs are driven from the first row."""
     until_s: float | None = None
     """End of the compared part [s]."""
     windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    """Recording -> its own start and end of the compared part [s]."""
+    """Start and end of the compared part of each recording, instead of `from_s` and `until_s` [s]."""
     intervals: Literal["residuals", "noise"] = "residuals"
     """Basis of the intervals: the final residuals with their autocorrelation, or the stated `noise`."""
 
@@ -136,7 +136,8 @@ AT_END: Final = 1e-3
 """A parameter this close to an end of its range is at that end."""
 
 Answer = list[Array] | str
-"""Differences of every channel of every recording for a set of parameters. Or the reason why it cannot be driven."""
+"""Differences of every channel of every recording for a set of parameters, or the reason why the set cannot be
+driven."""
 
 
 class Found(NamedTuple):
@@ -207,7 +208,7 @@ would attribute to the car."""
 
 
 FitProgress = Callable[[int, int, int, float], None]
-"""Function that is told the number of the tried set, its finished runs and all its runs, and the least misfit so far
+"""Callback that receives the number of the tried set, its finished runs and all its runs, and the least misfit so far
 (nan before the first)."""
 
 

@@ -80,7 +80,7 @@ class MeasuredValidation:
 
     @property
     def judged(self) -> list[Part]:
-        """Comparisons that decide: the last stage, in the check windows."""
+        """Comparisons that decide the verdict: the last stage, in the check windows."""
         stage = "predicted" if self.fitted is None else "fitted"
         return [one for one in self.parts if one.stage == stage and one.part == "check"]
 

@@ -35,7 +35,7 @@ class RunTable:
     """Table of a measured run: its files, map and windows."""
 
     name: str
-    """Its name."""
+    """Name of the run."""
     files: tuple[str, ...]
     """Files of the data logger, in the folder of this file."""
     map: str = ""
@@ -51,7 +51,8 @@ class QuantityTable:
     """A compared channel, with numbers in the unit of its key."""
 
     noise: Annotated[float, Range(1e-12)] | None = None
-    """Standard deviation of its noise, its weight in fits. By default the channel is not used in fits."""
+    """Standard deviation of the noise, which sets the weight of the channel in fits. By default the channel is not used
+    in fits."""
     offset: Annotated[float, Range(0.0)] | None = None
     """Constant part of the tolerance; by default the tolerance of `activesteer compare`."""
     gain: Annotated[float, Range(0.0)] | None = None
@@ -67,7 +68,7 @@ class PredictTable:
     factors: tuple[str, ...] = ()
     """Factors that the data must give before anything can be predicted, such as an unknown scale."""
     channels: tuple[str, ...] = ()
-    """Channels that determine them. By default all that have a noise."""
+    """Channels that determine these factors. By default all channels with a noise."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +76,13 @@ class IntervalTable:
     """A value that is known only within an interval."""
 
     source: str
-    """Where its ends come from."""
+    """Source of the ends of the interval."""
     ends: tuple[float, ...] = ()
-    """Its ends, of a key."""
+    """Ends of the interval of a key."""
     low: dict[str, Any] = field(default_factory=dict)
-    """Overrides of one end, of an interval of any name; only with a circle."""
+    """Overrides at one end of an interval of any name; only with a circle."""
     high: dict[str, Any] = field(default_factory=dict)
-    """Overrides of the other end."""
+    """Overrides at the other end."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +96,13 @@ class CircleTable:
     steering_wheel_rad: tuple[float, ...]
     """Size of the measured steering wheel angle, one value for each lap."""
     spread: dict[str, Annotated[float, Range(1e-12)]]
-    """`radius_m`, `ay_mps2` or a key of the car -> standard deviation from lap to lap."""
+    """Standard deviation from lap to lap of `radius_m`, `ay_mps2` or a key of the car."""
     zero_deg: float = 0.0
     """Steering wheel angle that the sensor shows straight ahead."""
     body_roll: float = 0.0
     """Part of the body's roll angle by which the accelerometer tilts: 0 levelled, 1 on the body."""
     stiff_column: bool = False
-    """Whether the steering column does not twist."""
+    """True if the steering column does not twist."""
     prediction: dict[str, Any] = field(default_factory=dict)
     """Overrides of the prediction that is judged. The intervals start from the car without them."""
 
@@ -121,13 +122,13 @@ class MeasuredTable:
     circle: CircleTable | None = None
     """The measured circle, in place of runs."""
     quantities: dict[str, QuantityTable] = field(default_factory=dict)
-    """Channel, in any unit -> how it is compared."""
+    """Comparison of each channel, which may be in any unit."""
     title: str = ""
     """Title of the page."""
     filter: Literal["iso15037", "fmvss126", "none"] = "iso15037"
-    """Filter of both sides (see `activesteer compare`)."""
+    """Filter of measured and simulated signals (see `activesteer compare`)."""
     noise_allowance: bool = True
-    """Whether to widen the corridors by the estimated noise of the measurement."""
+    """True to widen the corridors by the estimated noise of the measurement."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """Values of the car and the manoeuvre that are known better than in their files."""
     predict: PredictTable = PredictTable()
@@ -135,7 +136,7 @@ class MeasuredTable:
     factors: dict[str, Any] = field(default_factory=dict)
     """Factors of the fit, with ranges as in a study."""
     intervals: dict[str, IntervalTable] = field(default_factory=dict)
-    """Key -> ends of its unknown value, for the band around the prediction."""
+    """Ends of unknown values by key, for the band around the prediction."""
     assumptions: tuple[str, ...] = ()
     """Assumptions, one sentence each."""
 

@@ -49,7 +49,7 @@ class MeasurementMap:
     """Map file of an import."""
 
     channels: dict[str, ChannelMap] = field(default_factory=dict)
-    """Channel -> its source. By default, columns are recognised by their names."""
+    """Source of each channel. By default, columns are recognised by their names."""
     axes: Literal["iso8855", "sae_j670"] = "iso8855"
     """Axes of the file: SAE J670 has y to the right and z down."""
     time: str = ""
@@ -57,7 +57,7 @@ class MeasurementMap:
     time_unit: str = ""
     """Unit of the time; by default the unit of the file, or s."""
     shift_s: dict[str, float] = field(default_factory=dict)
-    """File -> time to add to its clock, if several files have separate clocks [s]."""
+    """Time to add to the clock of each file, if several files have separate clocks [s]."""
     step_s: Annotated[float, Range(1e-4, 1.0)] | None = None
     """Step of the recording; by default the step of the file."""
     max_gap_s: Annotated[float, Range(0.0)] = 0.1
@@ -87,7 +87,7 @@ class _Source(NamedTuple):
 
 
 _Files = Mapping[Path, list[Column]]
-"""File -> its columns."""
+"""Columns of each file."""
 
 
 def import_file(path: Path | Sequence[Path], map_path: Path | None = None, vehicle: str = "compact") -> Recording:

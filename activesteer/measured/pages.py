@@ -31,7 +31,7 @@ _START: Final = "#888888"
 _WIDE: Final = 3.2
 """Width of a simulated curve, at which a measured curve that coincides with it remains visible [pt]."""
 _SAME_TIME_S: Final = 0.05e-3
-"""Shifts below it are 0.0 ms."""
+"""Shift below which a table shows 0.0 ms [s]."""
 
 
 def comparison_page(found: Comparison, measured: list[str], simulated: str) -> Page:

@@ -98,17 +98,17 @@ _MISTAKES: Final = {
         ("ay_mps2", "g", "m/s2"),
     )
 }
-"""Channel -> factor of the error if the first unit was mistaken for the second."""
+"""Factors of the error, by channel, if the first unit was mistaken for the second."""
 _NEAR: Final = math.log(1.5)
 """Ratios within this range count as equal: ay/(v yaw rate) is 1 except for the change of the sideslip angle."""
 _LONGEST_STEP_S: Final = 1.0
-"""Step from which a motion of the car cannot be seen [s]."""
+"""Time step from which the motion of a car cannot be seen [s]."""
 _STEER_RANGE: Final = (0.001, 0.15)
-"""Plausible yaw rate over speed and steering wheel angle [1/m]. The value 1/(wheelbase x ratio) is 0.02, divided by 1
-+ (v/v_ch)^2, and less at the limit. Degrees taken as radians are off by a factor of 57."""
+"""Plausible yaw rate divided by speed and steering wheel angle [1/m]. The value 1/(wheelbase x ratio) is 0.02, divided
+by 1 + (v/v_ch)^2, and less at the limit. Degrees taken as radians are off by a factor of 57."""
 _SHORTEST_M: Final = 2.4
-"""Wheelbase of a short car [m]. With the angle of the road wheels, yaw rate over speed and angle is 1/wheelbase in a
-neutral car and less in one that understeers."""
+"""Wheelbase of a short car [m]. With the angle of the road wheels, yaw rate divided by speed and angle is 1/wheelbase
+in a neutral car, and less in an understeering car."""
 _FASTEST_RADPS: Final = 4.0
 """Yaw rate that no car on its wheels reaches [rad/s]."""
 

@@ -69,13 +69,13 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """Decorator: inline a function into each compiled function that calls it."""
+    """Decorate a function that is inlined into each compiled function that calls it."""
     _know_shared()
     return njit(inline="always", error_model="numpy")(function)
 
 
 def inlined_by_llvm(function: Callable[..., Any]) -> Any:
-    """Decorator: as `inlined`, for long functions. numba does not copy them into the caller, so they compile faster."""
+    """Decorate a long function as `inlined` does. numba does not copy it into the caller, so it compiles faster."""
     _know_shared()
     return njit(forceinline=True, error_model="numpy")(function)
 

@@ -42,9 +42,9 @@ def pointer_to(numba_type: types.Type) -> Any:
 
 
 f64_pointer = pointer_to(types.float64)
-"""Address (intp) -> pointer to float64."""
+"""Convert an address (intp) to a pointer to float64."""
 word_pointer = pointer_to(types.intp)
-"""Address (intp) -> pointer to a machine word."""
+"""Convert an address (intp) to a pointer to a machine word."""
 
 
 @inlined
@@ -97,7 +97,7 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """Numba type of a message from Python.
+    """Return the numba type of a message from Python.
 
     Every number is converted to float64. Check class and length of a message first: one that is too short ends the
     process.
@@ -107,7 +107,7 @@ def native_type(message: type[Any]) -> types.Tuple:
 
 
 def _places(kind: Any) -> list[tuple[int, ...]]:
-    """Indices of all numbers of a nested tuple, in order."""
+    """Return the indices of all numbers of a nested tuple, in order."""
     places: list[tuple[int, ...]] = []
     for index, part in enumerate(kind):
         if isinstance(part, types.BaseTuple):
@@ -129,7 +129,7 @@ def _store(_typing_context, address, message):
 
 
 store_numbers: Final[Any] = intrinsic(_store)
-"""`store_numbers(address, message)` in compiled code: write the numbers of a tuple as consecutive float64."""
+"""Write the numbers of a tuple as consecutive float64, in compiled code: `store_numbers(address, message)`."""
 
 
 N_STEERING: Final = 6
@@ -148,7 +148,7 @@ assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
 
 
 call_law: Final = call_at(types.void, *CALL)
-"""`call_law(address, (block, command, measurement, held))` in compiled code."""
+"""Call a law in compiled code: `call_law(address, (block, command, measurement, held))`."""
 
 
 def law_address(controller: Any) -> int:

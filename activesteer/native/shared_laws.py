@@ -17,7 +17,7 @@ MARKED: Final[list[Callable[..., Any]]] = []
 
 
 def shared(function: _Function) -> _Function:
-    """Decorator: let compiled code call a Python function.
+    """Decorate a Python function that compiled code may call.
 
     Python still calls it as is.
 
@@ -29,7 +29,7 @@ def shared(function: _Function) -> _Function:
 
 
 def law_of(kind: type[Any]) -> Callable[[_Function], _Function]:
-    """Decorator: declare a function of block, command and measurement as the law of a kind of controller.
+    """Decorate a function of block, command and measurement as the law of a kind of controller.
 
     It returns the first fields of an `ActuatorCommand`, and compiled code then carries the controller out.
     """

@@ -17,7 +17,7 @@ from activesteer.core.text_table import text_table, wrapped_line
 from activesteer.plotting.model import Curve, Panel, Picture
 
 _MOST_POINTS: Final = 2000
-"""Most points of a curve: twice the pixels of a chart."""
+"""Largest number of points of a curve: twice the pixels of a chart."""
 _DASHES: Final = {"-": (), "--": (4.0, 2.0), ":": (1.0, 1.6), "": None}
 _GREY: Final = "#777777"
 
@@ -114,15 +114,15 @@ def _one_line(label: str) -> str:
 
 
 Text = str | Markup
-"""Text is escaped. Markup must be made by `Markup`."""
+"""Content of a page. Text is escaped, and markup must be made by `Markup`."""
 
 
 _NARROW: Final = 3
-"""Most columns that fit on a phone."""
+"""Largest number of columns that fit on a phone."""
 _LONG: Final = 60
-"""Length of a cell that needs a separate line there."""
+"""Length of a cell that needs a separate line on a phone."""
 _LONG_WORD: Final = 24
-"""The same of a word."""
+"""Length of a word that needs a separate line on a phone."""
 _NUMBER: Final = re.compile(r"[+\-\N{MINUS SIGN}]?\d[\d.]*(e[+-]?\d+)?|none|-|\N{EN DASH}")
 
 

@@ -16,7 +16,7 @@ from activesteer.drawing.panels import BODY, DRIVING, MOTION, WHEELS, Line, Pane
 from activesteer.playback.runs import ReplayedRun, send
 
 _MOST_NUMBERS: Final = {1: 8.0, 2: 8.0, 3: 8.0, 4: 5.4}
-"""Number of plots on a page -> number of tick labels that fit on one axis in a window of 1280 x 800."""
+"""Number of tick labels that fit on one axis in a window of 1280 x 800, by number of plots on the page."""
 
 
 _MARGIN: Final = 1.02

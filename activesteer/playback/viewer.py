@@ -118,7 +118,7 @@ _HOST: Final = "127.0.0.1"
 _PLAIN: Final = Showing()
 _FOOTER: Final = b"RRF2FOOT"
 _FOOTER_BYTES: Final = 64
-"""A complete file has this word among its last bytes."""
+"""Word among the last bytes of a complete file."""
 
 
 def save(runs: Sequence[ReplayedRun], path: Path, how: Showing = _PLAIN) -> None:

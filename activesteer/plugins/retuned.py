@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 _WHOLE: Final = (type, ModuleType, FunctionType, BuiltinFunctionType, MethodType)
-"""Kinds of objects without a memory of their own."""
+"""Kinds of objects without a separate memory."""
 
 
 def retuned(running: Any, before: Any, after: Any) -> Any:

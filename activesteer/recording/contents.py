@@ -148,8 +148,8 @@ SCHEMA: Final[Mapping[str, Check]] = {
     "vehicle.controllers.afs.corrector": _all(_number(-1e12, 1e12)),
     "car": _all(lambda value, key: None if isinstance(value, list) else _number(1e-3, 100.0)(value, key)),
 }
-"""Known keys of the metadata -> check of their values. Road, course and car are checked in the modules that define
-them. Any key may be missing. Other keys may hold any JSON within the limits above."""
+"""Checks of the values of known keys of the metadata. Road, course and car are checked in the modules that define them.
+Any key may be missing. Other keys may hold any JSON within the limits above."""
 
 
 def check_metadata(metadata: Mapping[str, Any]) -> None:
@@ -170,7 +170,7 @@ _MISSING: Final = object()
 _READERS: Final[dict[str, Callable[[Mapping[str, Any]], Any]]] = {
     "maneuver": road_of, "course": course_of, "surface": surface_in, "car": footprint_of, "events": events_of,
 }  # fmt: skip
-"""Key of the metadata -> function that reads and checks its value."""
+"""Functions that read and check a value, by key of the metadata."""
 
 
 def _count(count: int, most: int, what: str, **place: Any) -> None:

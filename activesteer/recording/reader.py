@@ -65,7 +65,7 @@ _READ: Final = {
 }
 """Records that are kept. Chunks are read later, and all others repeat information."""
 _REFUSED: Final = (0, Opcode.FOOTER, Opcode.MESSAGE)
-"""Records that cannot stand here: none, the footer, and a message outside a chunk."""
+"""Records that may not occur here: none, the footer, and a message outside a chunk."""
 
 
 @dataclass

@@ -29,10 +29,10 @@ from activesteer.recording.chunks import Block, BlockDecoder
 MAX_CACHED_BYTES: Final = 3 * 2**27
 """Largest size of the cached channels of all open files together."""
 _READ_BYTES: Final = 2**27
-"""Size of one reading. Adjacent channels are read together, since any channel requires the whole file to be
+"""Size of one read operation. Adjacent channels are read together, since any channel requires the whole file to be
 decompressed."""
 _SMALL_BYTES: Final = 2**16
-"""Up to this size, a chunk may be compressed by any ratio."""
+"""Size up to which a chunk may be compressed by any ratio."""
 
 BROKEN: Final = (
     McapError, struct.error, UnicodeDecodeError, ValueError, OverflowError, RuntimeError, MemoryError,
@@ -228,7 +228,7 @@ class FileRows:
 
 
 _cached: Final[OrderedDict[tuple[int, int], NDArray]] = OrderedDict()
-"""Token of an open file and column -> channel, the least recently used one first."""
+"""Cached channels by token of an open file and by column, the least recently used first."""
 _tokens = count()
 
 

@@ -62,7 +62,7 @@ class Course:
         return float(self.cones_m[:, 0].min()) if len(self.cones_m) else 0.0
 
     def row_m(self) -> Array:
-        """Return the cones that mark no lane, as those of a slalom [m], shape (n, 2)."""
+        """Return the cones that mark no lane, such as the cones of a slalom [m], shape (n, 2)."""
         return self.cones_m[~self.on_lane_side()]
 
     def on_lane_side(self) -> NDArray[np.bool_]:

@@ -123,7 +123,7 @@ _MAX_CELLS: Final = 65536
 _SAME_PASS: Final = 20
 """Points of the path further apart than this belong to different passes [-]."""
 _ON_EARLIER_M: Final = 1.0
-"""A later pass nearer to an earlier one than this is on it [m]."""
+"""Distance below which a later pass counts as on an earlier pass [m]."""
 
 
 class PathGrid(NamedTuple):

@@ -75,7 +75,7 @@ _SHAPES: Final = {
 }  # fmt: skip
 Kind = Literal["cosine_bump", "cleat", "kerb", "pothole", "cross_slope_ramp", "sine_wave"]
 SIDES: Final = {"both": (-math.inf, math.inf), "left": (0.0, math.inf), "right": (-math.inf, 0.0)}
-"""Name of a side -> its right and left border [m]."""
+"""Right and left border of each side [m]."""
 FIRST_START_M: Final = 2.0
 """Smallest distance of an obstacle from the start [m]: the front wheels are about 1.3 m ahead of the origin."""
 _LONG_M: Final = 1.5
@@ -168,14 +168,14 @@ class Obstacle:
 REFERENCE_1PM: Final = 0.1
 """Spatial frequency at which the classes are defined [cycles/m]."""
 CLASSES: Final = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6, "E": 4096e-6}
-"""Class -> geometric mean of the displacement spectrum at `REFERENCE_1PM` [m3]."""
+"""Geometric mean of the displacement spectrum at `REFERENCE_1PM`, for each class [m3]."""
 STEP_M: Final = 0.05
 """Distance of the rows [m]."""
 _ACROSS_M: Final = 0.2
 """Distance of the columns [m]."""
 _CHUNK: Final = 1000
 _NUGGET: Final = 1e-10
-"""Added to the diagonal, so that long waves, which all tracks share, keep a Cholesky factor."""
+"""Number added to the diagonal, so that long waves, which all tracks share, keep a Cholesky factor."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ _MAX_SLICES: Final = 200
 _EDGE_POINTS: Final = 31
 """Points of the edge of an obstacle, so that a border of the drawing cuts a turned one within some centimetres."""
 _SHOWN_BESIDE_M: Final = 4.0
-"""Width to either side of the path in which its friction is drawn [m]. It counts further out too."""
+"""Width to either side of the path in which its friction is drawn [m]. The friction also counts further out."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class Road:
     """CSV file with the columns s_m and z_m, or s_m, left_z_m and right_z_m: a path, or a name in the manoeuvre's
     folder."""
     heights: ProfileTable | None = None
-    """Heights of two tracks over the distance. Default: the heights of the CSV."""
+    """Heights of two tracks versus distance. Default: the heights of the CSV."""
     roughness: Roughness | None = None
     """Random roughness of ISO 8608. Default: none."""
     crg: str | None = None
@@ -163,14 +163,14 @@ class Road:
     crg_data: tuple[str, ...] = ()
     """Content of that file, compressed, as recordings keep it."""
     banking: BankingTable | None = None
-    """Bank over the distance, as for a banked curve. Default: none."""
+    """Bank versus distance, as for a banked curve. Default: none."""
     contact: Literal["auto", "single_point", "four_point", "enveloping"] = "auto"
-    """How a tyre follows an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` if all
+    """Model of the contact with an uneven road, see `activesteer.vehicle.native_contact`. `auto`: `single_point` if all
     unevenness is long and smooth, otherwise `enveloping`."""
     start_m: Annotated[float, Range(3.0, 1000.0)] = 10.0
-    """Distance from which an uneven surface or `banking` acts fully [m]. It is blended in from 2 m on."""
+    """Distance from which an uneven surface or `banking` acts fully [m]. The surface fades in from 2 m on."""
     outside: Literal["extend", "error"] = "extend"
-    """Beyond the known surface: `extend` its edge, or end the run with an `error`."""
+    """Behaviour beyond the known surface: `extend` its edge, or end the run with an `error`."""
 
     def __post_init__(self) -> None:
         """Check that every key has an effect."""

@@ -55,13 +55,13 @@ _MAX_ELEMENTS: Final = 20_000
 _MAX_DEPTH: Final = 100
 _MAX_ASSET_BYTES: Final = 50_000_000
 _MAX_PIXELS: Final = 20_000_000
-"""Pixels of a texture, samples of a height field."""
+"""Largest number of pixels of a texture, or of samples of a height field."""
 _MAX_COPIES: Final = 1000
-"""Maximum of copies by `replicate`, `composite` and `flexcomp`, over all levels."""
+"""Largest number of copies by `replicate`, `composite` and `flexcomp`, over all levels."""
 _MAX_NUMBER: Final = 1e5
 """Largest number in an attribute of _COUNTS."""
 _MAX_MEMORY: Final = 1e9
-"""Maximum of memory that a model reserves for the engine [bytes]."""
+"""Largest memory that a model reserves for the engine [bytes]."""
 _BYTES: Final = {"K": 2.0**10, "M": 2.0**20, "G": 2.0**30, "T": 2.0**40, "P": 2.0**50, "E": 2.0**60}
 _COUNTS: Final = {
     "size": None,
@@ -76,7 +76,7 @@ _COUNTS: Final = {
     ),
     "mesh": ("maxhullvert",),
 }
-"""Element -> attributes with amounts of memory or numbers of iterations, or None for all attributes."""
+"""Attributes of each element with amounts of memory or numbers of iterations, or None for all attributes."""
 _COPYING: Final = ("replicate", "composite", "flexcomp")
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
@@ -368,7 +368,7 @@ def battery_power_W(battery: Battery) -> tuple[float, float]:
 _LARGEST_SLIP_ANGLE_RAD: Final = np.radians(20.0)
 """Largest slip angle of the grid. Beyond it the force stays constant [rad]."""
 _LARGEST_LOAD: Final = 3.0
-"""Largest load of the grid over the static load. Beyond it the force stays constant."""
+"""Largest load of the grid, divided by the static load. Beyond it the force stays constant."""
 _SPEED_MPS: Final = 20.0
 """Speed at which the tyres are evaluated [m/s]."""
 

@@ -190,7 +190,8 @@ _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
     ("cones", "spacing_m"): (r"[\d.]+ m\b", "{:.3g} m", 1.0),
     ("road", "mu"): (r"\b(dry|slippery)\b", "friction {:.3g}", 1.0),
 }
-"""Field of a manoeuvre -> pattern of its value in a title, text of a driven value, and the unit of this text in SI."""
+"""Pattern of a field's value in a title, text of a driven value, and unit of this text in SI, by field of a
+manoeuvre."""
 
 
 def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:
@@ -395,7 +396,7 @@ def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
 
 
 _LONGEST: Final = 200_000
-"""Maximum of points of a table. A longer recording is thinned."""
+"""Largest number of points of a table. A longer recording is thinned."""
 _ON_GROUND: Final = 0.5
 """Minimum speed of a manoeuvre with a moving car [m/s]."""
 

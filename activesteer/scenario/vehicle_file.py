@@ -18,7 +18,7 @@ from activesteer.errors import ParameterError
 _NOTE: Final = "# Written by `"
 """Start of the comment with the origin of the values, which replaces an older one."""
 _SAME: Final = {"characteristic_speed_mps": "characteristic_speed_kmh"}
-"""Written key -> its other spelling in a file."""
+"""Other spellings of written keys in a file."""
 
 
 def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], command: str, date: str) -> None:

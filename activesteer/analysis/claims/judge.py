@@ -33,17 +33,17 @@ from activesteer.errors import ParameterError, RecordingError
 SYSTEMS: Final = ("none", "ars", "afs")
 """Names of the compared runs: no control, active rear steering, active front superposition."""
 TOGETHER: Final = "together"
-"""Name in place of a system for values that several runs have together."""
+"""Name in place of a system's name, for values of several runs together."""
 MEAN_S: Final = 0.2
 """Time over which an angle is averaged [s]. A car begins to respond in this time: the compact's lateral acceleration is
 at 90 % of its steady state 0.24 s after a step of the steering wheel. The noise of a production yaw rate sensor, 0.1
 deg/s in samples of 10 ms, times the largest gain of the paper's controllers, 0.42 s, is 0.04 deg rms at one time and
 0.01 deg in this mean."""
 AHEAD_RAD: Final = math.radians(1.0)
-"""Steering wheel angle whose first passing ends the part straight ahead [rad]."""
+"""Steering wheel angle that ends the straight-ahead part when it is first exceeded [rad]."""
 
 RunMetrics = dict[str, dict[str, float]]
-"""System, or `together` -> metrics."""
+"""Metrics by system, or by `together`."""
 
 
 class Kind(StrEnum):
@@ -60,13 +60,13 @@ class Statement:
     """A statement of the paper, and its criterion."""
 
     id: str
-    """Its number."""
+    """Number of the statement."""
     text: str
-    """Its words."""
+    """Text of the statement."""
     criterion: str
-    """Condition for it to pass, in addition to the conditions of all statements (`obstacle_of`)."""
+    """Condition for the statement to hold, in addition to the conditions of all statements (`obstacle_of`)."""
     values: dict[str, tuple[str, ...]]
-    """Values to show: names of systems -> names of metrics."""
+    """Values to show: names of metrics by names of systems."""
     conditions: tuple[str, ...]
     """Requirements that must all hold."""
 
@@ -171,7 +171,7 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> tuple[str, float]:
-    """Return the reason why no claim about three runs can pass, and how far it is from vanishing, 0 to 1."""
+    """Return the reason why no claim about three runs can pass, and its distance from vanishing, 0 to 1."""
     # A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
     # `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
     # demand as much of an actuator that its system does not have: an action that was not performed proves nothing.
@@ -213,13 +213,13 @@ def _means(values: Array, timestep_s: float) -> Array:
 
 
 LEVEL: Final = 0.9
-"""Fraction of the steady-state value of none at which the delays of the step steer are compared."""
+"""Fraction of the steady-state value of `none` at which the delays of the step steer are compared."""
 MIN_ANGLE_RAD: Final = math.radians(0.1)
 """Least size of two added angles that are compared [rad]."""
 END_S: Final = 3.0
 """Length of the end of the slippery run, which the paper's figures show [s]."""
 COMMON_DELAYS: Final = {"yaw_rate_delay_s": ("yaw_rate", "radps"), "ay_delay_s": ("ay", "mps2")}
-"""Times at which signals reach a common level, 90 % of the steady-state value of none. Name and unit of the signals."""
+"""Names and units of the signals whose times to a common level, 90 % of the steady state of `none`, are compared."""
 TURNED: Final = (("rear_steer", "rad"), ("superposition", "rad"), ("sideslip", "rad"))
 """Settled angles that count from straight ahead, where the offset of a sensor also turns wheels."""
 ADDED: Final = ("rear_steer_steady_state_rad", "superposition_steady_state_rad")
@@ -358,8 +358,8 @@ SCENARIOS: Final[dict[str, Scenario]] = {
         "slippery double lane change", Kind.DRIVER, _ROWS["double_lane_change_low_mu"], _slippery_metrics
     ),
 }
-"""Name of the manoeuvre -> its claims, in the order of the paper's sections."""
+"""Claims by the name of their manoeuvre, in the order of the paper's sections."""
 STATEMENTS: Final = {row.id: row for scenario in SCENARIOS.values() for row in scenario.statements}
-"""Number -> statement, in the same order."""
+"""Statements by number, in the same order."""
 SCENARIO_OF: Final = {row.id: name for name, scenario in SCENARIOS.items() for row in scenario.statements}
-"""Number of a statement -> name of its manoeuvre."""
+"""Name of the manoeuvre of each statement, by the number of the statement."""

@@ -28,7 +28,7 @@ from activesteer.errors import ParameterError, nearest_names
 LITERATURE: Final = "literature"
 PAPER: Final = "paper"
 SETTINGS: Final = {PAPER: "paper's setting", LITERATURE: "driver from literature"}
-"""Name of a setting -> its title."""
+"""Titles of the settings, by name."""
 VEHICLE: Final = "compact"
 """Car of the paper's setting."""
 NOT_REPRODUCED: Final = Path(__file__).parent / "not_reproduced.toml"
@@ -43,9 +43,9 @@ class Number:
     key: str
     """Dotted key, as for `--set`."""
     value: float | str
-    """Its value in this setting."""
+    """Value of the number in this setting."""
     nominal: float | str
-    """Its value in the setting `literature`."""
+    """Value of the number in the setting `literature`."""
     reason: str
     """Source of the range."""
     low: float | None = None
@@ -53,7 +53,7 @@ class Number:
     high: float | None = None
     """Upper end of the range."""
     maneuvers: tuple[str, ...] = ()
-    """Manoeuvres in which it acts, or empty for all."""
+    """Manoeuvres in which the number has an effect, empty for all."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class Setting:
     title: str = ""
     """Title in one line."""
     numbers: tuple[Number, ...] = ()
-    """Everything that differs from the nominal car, driver and manoeuvre."""
+    """Numbers that differ from the nominal car, driver and manoeuvre."""
     fails: dict[str, str] = field(default_factory=dict)
-    """Number of each statement that does not hold -> reason."""
+    """Reason for each statement that does not hold, by its number."""
 
     def overrides(self, scenario: str) -> dict[str, Any]:
         """Return the overrides of a scenario."""

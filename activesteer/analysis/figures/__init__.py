@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Draw = Callable[[Mapping[str, RecordingLike]], "Figure"]
-"""Function from recordings by system to a figure."""
+"""Function that draws a figure from recordings by system."""
 
 
 def _over_time(*panels: str) -> Draw:
@@ -71,7 +71,7 @@ BY_SCENARIO: Final[dict[str, dict[str, Draw]]] = {
         "figure_24_slippery_sideslip": _over_time("sideslip"),
     },
 }
-"""Scenario -> file name without its ending -> function that draws the figure."""
+"""Functions that draw the figures, by scenario and by file name without its ending."""
 
 TOP_SPEED_MPS: Final = 200.0 / 3.6
 """Greatest speed of the predicted angle [m/s]."""
@@ -169,7 +169,7 @@ BY_KIND: Final[dict[str, Draw]] = {
     "slalom": tracks.overview,
     "follow_path": tracks.overview,
 }
-"""Kind of manoeuvre -> function that draws an overview. Other kinds are drawn by `over_time.time_figure`."""
+"""Functions that draw an overview, by kind of manoeuvre. Other kinds are drawn by `over_time.time_figure`."""
 
 
 def draw_all(recordings: Mapping[str, Mapping[str, RecordingLike]], folder: str | os.PathLike[str]) -> list[Path]:

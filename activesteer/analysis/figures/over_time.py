@@ -42,7 +42,7 @@ DOTTED: Final[LineStyle] = (0.0, (1.0, 1.6))
 FRONT_LABEL: Final = "added in front"
 """Legend of the dotted line of a run that adds angles at both axles."""
 PATCH_COLOUR: Final = "#c3d9ec"
-"""Colour of a place with another friction."""
+"""Colour of a place with a different friction."""
 MAX_POINTS: Final = 5000
 """Largest number of samples of a curve: a plot cannot show more, and its file would be large."""
 
@@ -85,7 +85,7 @@ def draw(
 
 
 def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width: float = LINE_PT) -> None:
-    """Draw the lines of a run, all but the first dotted."""
+    """Draw the lines of a run, with all lines but the first dotted."""
     lines = panel.lines_in(FIGURE)
     # A panel of one line needs it; of several, a run has some.
     shown = lines if len(lines) == 1 else [line for line in lines if line.of(curve.recording) is not None]
@@ -100,7 +100,7 @@ def friction_label(low: float, high: float) -> str:
 
 
 def present(panels: Sequence[Panel], drawn: Sequence[DrawnRun]) -> list[Panel]:
-    """Return the panels. The panel of the added angles is left out if no run has any."""
+    """Return the panels to draw, without the panel of the added angles if no run has any."""
     return [
         panel for panel in panels if panel is not PANELS["added"] or any(added_lines(each.recording) for each in drawn)
     ]

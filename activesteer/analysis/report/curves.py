@@ -22,9 +22,9 @@ from activesteer.road.course import CONE_RADIUS_M, Course
 from activesteer.road.road import road_of
 
 RATE_HZ: Final = 200.0
-"""Most samples of a signal per second. The car's own motion ends below 20 Hz."""
+"""Largest number of samples of a signal per second. The car's own motion ends below 20 Hz."""
 MAX_SAMPLES: Final = 4000
-"""Most samples of a signal: twice the pixels of the widest screen, before zooming in."""
+"""Largest number of samples of a signal: twice the pixels of the widest screen, before zooming in."""
 MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
@@ -84,7 +84,7 @@ def _marks(group: Group) -> list[tuple[float, str]]:
 
 
 def _slip_limit_deg(group: Group) -> float | None:
-    """Return the slip angle of the largest side force of the rear tyres [deg], if it is the same in all runs."""
+    """Return the slip angle at which the side force of the rear tyres peaks [deg], if it is the same in all runs."""
     limits: set[Any] = {run.recording.metadata.get("slip_limit_rad") for run in group.runs}
     if len(limits) > 1 or None in limits or any(event.kind == "set" for run in group.runs for event in run.events):
         return None

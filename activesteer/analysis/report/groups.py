@@ -56,10 +56,10 @@ def _same(recordings: list[Recording], table: str) -> bool:
 
 
 MAX_RUNS: Final = 60
-"""Most runs of a report. With more runs, nobody can read the page and a browser is slow to open it."""
+"""Largest number of runs in a report. With more runs, nobody can read the page and a browser is slow to open it."""
 
 MOST_EVENTS: Final = 20
-"""Most events of a run that a report names."""
+"""Largest number of events of a run in a report."""
 
 
 class ReportedRun(NamedTuple):
@@ -78,7 +78,7 @@ class ReportedRun(NamedTuple):
 
     @property
     def metrics(self) -> Mapping[str, float]:
-        """Metrics to show. Cones that a person has not driven up to are not judged, nor a response that is none."""
+        """Metrics to show, without cones that a person did not reach, and without values of a missing response."""
         metrics = without_response(self.recording, self.recording.metrics)
         return as_far_as_driven(self.recording, metrics) if self.by_hand else metrics
 

@@ -37,7 +37,7 @@ _VERDICT_LOOK: Final = {
     Verdict.NOT_REPRODUCED: ("known", "\N{NOT EQUAL TO}"),
     Verdict.UNEXPECTED: ("passed", "\N{CHECK MARK}"),
 }
-"""Verdict -> its class in the stylesheet, and its mark."""
+"""Class in the stylesheet and mark of each verdict."""
 _CHANGE_MARK: Final = {
     Change.BETTER: "\N{CHECK MARK}",
     Change.WORSE: "\N{BALLOT X}",

@@ -33,7 +33,7 @@ _MEASUREMENT_BYTES: Final = _BYTES * len(numbers_of(Measurement))
 
 @compiled_callback(types.void, types.intp, types.intp, types.intp, types.intp)
 def car_step(bindings, commands, torques_set, out):
-    """Make one step of the car, and write whether its state is valid, the measurement and the motion."""
+    """Make one step of the car. Write the measurement, the motion, and whether the state is valid."""
     measurement = out + _BYTES
     sane = carry_out(bindings, commands, torques_set != 0, measurement, measurement + _MEASUREMENT_BYTES)
     f64_pointer(out)[0] = 1.0 if sane else 0.0

@@ -298,7 +298,7 @@ def _data(
 
 
 def _plain(values: Any) -> list[int | float]:
-    """Convert numbers of NumPy, and bool, to Python's."""
+    """Convert the numbers of NumPy, and bool, to numbers of Python."""
     return [value.item() if isinstance(value, np.generic) else value for value in values]
 
 

@@ -23,7 +23,7 @@ from activesteer.errors import ModelError
 from activesteer.vehicle import Vehicle
 
 PROCESSOR: Final = "x86-64-v3"
-"""Processor for which code is made: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
+"""Processor for which code is compiled: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
 
 
 def car_code() -> dict[str, bytes]:
@@ -68,7 +68,7 @@ def _code(name: str, function: Any) -> bytes:
 
 _ALIGNMENT: Final = 64
 _LEAST_ADDRESS: Final = 1 << 32
-"""A larger number in a record is an address: no size or index is so large."""
+"""Limit above which a number in a record is an address: no size or index is so large."""
 _STRUCT_BYTES: Final = {"model": 8192, "data": 262_144}
 
 SEGMENT, FUNCTION, MODEL, MODEL_ARRAY, DATA, DATA_ARRAY = range(6)

@@ -42,7 +42,8 @@ PLACE_GROUPS: Final = (
 )  # fmt: skip
 """Sensors of the engine that these channels are computed from."""
 PLACES: Final = [name for names in PLACE_GROUPS for name in names]
-"""Their names, in the order in which car.c keeps their places; of a position, that of its height."""
+"""Names of these sensors, in the order in which car.c keeps their places. For a position, the place is the place of its
+height."""
 
 
 class Variable(NamedTuple):

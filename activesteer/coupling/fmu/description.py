@@ -107,7 +107,7 @@ _FORMATS: Final = {
     "Real": "d", "Float64": "d", "Float32": "f", "Integer": "i", "Int8": "b", "UInt8": "B", "Int16": "h", "UInt16": "H",
     "Int32": "i", "UInt32": "I", "Int64": "q", "UInt64": "Q",
 }  # fmt: skip
-"""Numeric type of FMI -> format of `struct`. Boolean and Enumeration depend on the version."""
+"""Formats of `struct` for the numeric types of FMI. Boolean and Enumeration depend on the version."""
 _HERTZ: Final = re.compile(r"k?Hz|rev.*|r/.*|rpm")
 
 

@@ -28,7 +28,7 @@ _MAX_TEXT_BYTES: Final = 2**16
 """Longest error text of an isolated FMU [bytes]."""
 _MAX_DIGITS: Final = 20
 START_LIMIT_S: Final = 30.0
-"""Least time that an isolated FMU gets to load and initialise [s]."""
+"""Shortest time limit for an isolated FMU to load and initialise [s]."""
 
 
 class FmuFault(Exception):  # noqa: N818 - a fault of the FMU
@@ -164,7 +164,7 @@ class LocalInstance:
 
     @property
     def _state(self) -> str:
-        """Name of a state in the FMI functions."""
+        """Return the name of a state in the FMI functions."""
         return "FMUstate" if self._spec.version == 2 else "FMUState"
 
     def _kept(self, state: Any, steps: int) -> int:
@@ -239,7 +239,7 @@ class LocalInstance:
         return f": {self._log[:_MAX_LOG]}" if self._log else ""
 
     def _said(self, *message: Any) -> None:
-        """Store a log message, the last argument in both versions."""
+        """Store a log message, which is the last argument in both versions."""
         self._log = (message[-1] or b"").decode(errors="replace")
 
 
@@ -286,7 +286,7 @@ class IsolatedInstance:
             self._ask(_FORGET + str(state).encode())
 
     def serialise(self, state: int) -> bytes:
-        """Return the bytes of a state that the FMU's process has saved."""
+        """Return the bytes of a state that the process has saved."""
         return self._ask(_SERIALISE + str(state).encode(), most_bytes=_MAX_STATE_BYTES)
 
     def deserialise(self, content: bytes) -> int:

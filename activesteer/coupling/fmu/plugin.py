@@ -194,7 +194,7 @@ class FmuBlock:
         self._unchecked = bool(kind.filled) or any(names[field] in kind.unchecked for field in fields)
 
     def step(self, *messages: Any) -> Any:
-        """Return the command of the FMU (see `Controller.step` and `Driver.step`)."""
+        """Return the command that the FMU computes (see `Controller.step` and `Driver.step`)."""
         self._steps += 1
         if self._every > 1 and (self._steps - 1) % self._every:
             return self._held
@@ -244,7 +244,7 @@ class FmuBlock:
         return self._fmu.fail(f"this manoeuvre gives no {' or '.join(dict.fromkeys(empty))}, which the FMU needs")
 
     def _refused(self, results: Sequence[float], field: int, value: float) -> Exception:
-        """Return the error for an output that is not finite or out of its range."""
+        """Return the error for an output that is not finite or is outside its range."""
         fmu, kind = self._fmu, self._fmu.kind
         if math.isfinite(value):
             try:
@@ -341,9 +341,9 @@ def _revived(fmu: Fmu, setup: Any, parameters: Mapping[str, Any], content: bytes
 ISOLATE: Final = "isolate"
 _ISOLATE_RANGE: Final = (0.001, 3600.0)
 _MESSAGES: Final = {"controller": (DriverCommand, Measurement), "driver": (Setpoint, Measurement, Motion)}
-"""Kind of block -> the messages that it gets."""
+"""Messages that each kind of block receives."""
 _MAX_KEPT_BYTES: Final = 4_000_000
-"""Largest FMU that a recording keeps. Of a larger one it keeps the description and the digest."""
+"""Largest FMU that a recording keeps. For a larger FMU, it keeps the description and the digest."""
 
 
 class Fmu:

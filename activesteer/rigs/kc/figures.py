@@ -30,9 +30,9 @@ _DASHES: Final = (0.0, (4.0, 3.0))
 _DEG: Final = math.degrees(1.0)
 _AXLES: Final = (("front axle", 0), ("rear axle", 2))
 _NOTHING: Final = 1e-9
-"""Values below it are rounding errors."""
+"""Value below which a result is a rounding error."""
 _FURTHEST: Final = 0.6
-"""How far beyond its band a metric is drawn, in widths of the band."""
+"""Largest distance beyond its band at which a metric is drawn, in widths of the band."""
 
 
 Row = tuple[str, Callable[[Sweep], Array]]
@@ -189,7 +189,7 @@ _GRIDS: Final = {
         "moment on each wheel [Nm]", 1.0,
     ),
 }  # fmt: skip
-"""Name of a figure -> its content."""
+"""Contents of the figures, by name."""
 
 
 def _drawn_grid(result: KcResult, grid: Grid) -> Picture:

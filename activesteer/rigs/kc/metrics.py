@@ -27,8 +27,8 @@ _SMALL: Final = {
     "parallel": SMALL_TRAVEL_M, "opposite": SMALL_TRAVEL_M, "lateral": 1000.0, "longitudinal": 1000.0,
     "aligning": 100.0,
 }  # fmt: skip
-"""First word of a sweep's name -> range about static ride in which a straight line gives the slopes: travel [m], force
-[N] or moment [N m]."""
+"""Range about static ride in which a straight line gives the slopes, by the first word of a sweep's name: travel [m],
+force [N] or moment [N m]."""
 
 
 class Axle(NamedTuple):
@@ -387,7 +387,8 @@ FORMULAS: Final[dict[str, Callable[[Axle], float]]] = {
     "braking_pitch_gradient": lambda axle: _per_g(axle.measured.modes.pitch_gradient_radps2pm),
     "damper_asymmetry": _damper_asymmetry,
 }
-"""Characteristic of metrics.toml -> function from an axle to its value. Others are slopes, axes or modes."""
+"""Functions from an axle to a value, by characteristic of metrics.toml. Other characteristics are slopes, axes or
+modes."""
 
 
 @dataclass(frozen=True)
