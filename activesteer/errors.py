@@ -121,7 +121,7 @@ def shown(value: object) -> str:
 
 
 def nearest_names(name: str, known: Iterable[str], maximum: int = 5) -> str:
-    """Return words for an error message: the existing names closest to a wrong one.
+    """Return words for an error message: the existing names closest to a wrong name.
 
     Args:
         name: The name that does not exist.

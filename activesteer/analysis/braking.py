@@ -23,7 +23,7 @@ STOPPED_MPS: Final = 0.1
 FROM_FRACTION, TO_FRACTION = 0.8, 0.1
 """Fractions of the initial speed for the mean fully developed deceleration (UN R13-H): 80 and 10 of 100 km/h."""
 SLIPS_FROM_MPS: Final = 15.0 / 3.6
-"""Speed above which no wheel shall lock [m/s]. UN R13-H, annex 6 has the same speed."""
+"""Speed above which no wheel may lock [m/s]: the same speed as in UN R13-H, annex 6."""
 
 
 def straight_braking_metrics(recording: RecordingLike) -> dict[str, float]:

@@ -176,7 +176,7 @@ def track_over_x(recording: RecordingLike, x_m: Array) -> Array:
 
 
 def largest_difference(first: RecordingLike, second: RecordingLike, from_x_m: float, to_x_m: float) -> float:
-    """Return the largest lateral distance between two tracks at the same x [m], or nan if one is too short."""
+    """Return the largest lateral distance between two tracks at the same x [m], or nan if a track is too short."""
     x = np.linspace(from_x_m, to_x_m, max(2, math.ceil((to_x_m - from_x_m) / 0.1) + 1))
     return float(np.abs(track_over_x(first, x) - track_over_x(second, x)).max())
 

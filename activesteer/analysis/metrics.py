@@ -86,7 +86,7 @@ def energy_metrics(recording: RecordingLike) -> dict[str, float]:
 
 
 def _steering(recording: RecordingLike, vehicle: Mapping[str, Any]) -> Iterator[NDArray[np.float64]]:
-    """Yield the mechanical powers of the steering actuators."""
+    """Yield the mechanical power of each steering actuator."""
     rear = np.gradient(recording["rear_steer_rad"], recording.time_s)
     added = vehicle["steering"]["ratio"] * np.gradient(recording["superposition_rad"], recording.time_s)
     presets = vehicle["rear_actuator"], vehicle["superposition_actuator"]
@@ -220,7 +220,7 @@ def key_figures_of(names: Collection[str]) -> dict[str, str]:
 
 
 def label_of(name: str, names: Collection[str]) -> str:
-    """Return the words for a metric among the metrics of a run, as its key figure has them."""
+    """Return the words for a metric of a run, as the run's key figures show them."""
     if name in _ON_A_PATH and _PATH in names:
         title = _ON_A_PATH[name].removesuffix(", magnitude")
         return title[0].lower() + title[1:]

@@ -19,8 +19,8 @@ Array = NDArray[np.floating]
 """Array of floating-point numbers, of any shape."""
 
 SMOOTHING_S: Final = 0.04
-"""Width of the smoothing window [s]. A cubic fit over it leaves a 3 Hz oscillation unchanged to 1e-4 of its amplitude
-and takes white noise at 1 kHz down to a quarter."""
+"""Width of the smoothing window [s]. A cubic fit over it leaves a 3 Hz oscillation unchanged to 1e-4 of its amplitude.
+It reduces white noise at 1 kHz to a quarter."""
 
 RATE_SPAN_S: Final = 0.01
 """Interval over which a rate of change is taken [s]."""
@@ -160,7 +160,7 @@ def timestep(time_s: Array) -> float:
 def step_response(
     time_s: Array, values: Array, step_time_s: float, window_s: float, minimum: float
 ) -> dict[str, float]:
-    """Return the metrics of a step response: steady state, response time, peak, peak time and overshoot.
+    """Return the metrics of a response to a step: steady state, response time, peak, peak time and overshoot.
 
     The signal is at zero before the step and may move either way. `smooth` reduces its noise for crossings and maxima;
     the steady-state value is the mean of the samples of a window at the end. The response time is nan if the signal
@@ -186,7 +186,7 @@ def step_response(
 
 
 _ENDS_PERIODS: Final = 6.0
-"""Time in which the filter dies away, in periods of the cut-off frequency."""
+"""Time in which the response of the filter decays, in periods of the cut-off frequency."""
 
 
 def low_pass(values: Array, timestep_s: float, cut_off_Hz: float, poles: int = 12) -> NDArray[np.float64]:

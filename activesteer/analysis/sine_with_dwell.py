@@ -40,7 +40,7 @@ STEERING_CUT_OFF_Hz: Final = 10.0
 MOTION_CUT_OFF_Hz: Final = 6.0
 """Cut-off frequency for yaw rate and lateral acceleration [Hz]."""
 LONGEST_CREEP_S: Final = 0.1
-"""Longest time from the threshold to the centre [s]. A slower wheel creeps, and its line is extrapolated."""
+"""Longest time from the threshold to the centre [s]. A slower steering wheel creeps, and its line is extrapolated."""
 PEAK_PROMINENCE: Final = 0.02
 """Least prominence of a peak of the yaw rate, as a fraction of the largest peak."""
 INSTANTS_S: Final = (1.0, 1.75)

@@ -97,7 +97,7 @@ class Source:
 
 
 def _numbered(name: str, elements: Mapping[str, int]) -> str:
-    """Return a dotted key, with the current index after the name of each list."""
+    """Return a dotted key with the current index after the name of each list."""
     key = ""
     for part in name.strip().split("."):
         key = f"{key}.{part}" if key else part

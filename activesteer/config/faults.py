@@ -47,8 +47,7 @@ ACTUATORS: Final = {
 SENSORS: Final = {
     f"{name}_sensor": unit for name, _, unit in (number.name.rpartition("_") for number in numbers_of(Measurement)[1:])
 }
-"""Unit of each sensor's signal, as the suffix of a key. Sensors are the signals that a controller receives, except the
-time."""
+"""Unit of each sensor's signal, as the suffix of a key. All signals of a controller except the time."""
 
 KINDS: Final = {
     "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
@@ -74,7 +73,7 @@ class Fault:
     kind: str
     """Effect: `stuck`, `runaway`, `float`, `offset`, `reversed`, `delayed` or `dropout`."""
     start_s: Annotated[float, Range(0.0)]
-    """Start [s]."""
+    """Start of the fault [s]."""
     end_s: Annotated[float, Range(0.0)] | None = None
     """Time from which the part works again [s]; default never."""
     side: str | None = None

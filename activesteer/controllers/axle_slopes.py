@@ -26,8 +26,8 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION = map(
     Estimate._fields.index, ("speed_mps", "sideslip_rad", "yaw_rate_radps", "friction")
 )
 _MOST: Final = 0.95
-"""Fraction of the largest axle force up to which slip angles are tabulated [-]. There one percent of force is 0.3 deg
-of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the friction is not known to a percent."""
+"""Fraction of the largest axle force up to which slip angles are tabulated [-]. At this fraction, one percent of force
+is 0.3 deg of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the friction is not known to a percent."""
 
 
 class AxleSlopes(NativeBlock):
@@ -74,7 +74,7 @@ class AxleSlopes(NativeBlock):
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
-    """Return the excess of an axle's slip angle over the linear one, at rising lateral accelerations [rad].
+    """Return the excess of an axle's slip angle over the linear slip angle, at rising lateral accelerations [rad].
 
     `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
     """

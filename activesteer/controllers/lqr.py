@@ -502,7 +502,7 @@ def feedback(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> Array:
-    """Return the feedback gains of both actuators at a speed, shape (2, 8), with a zero row for a failed one."""
+    """Return the feedback gains of both actuators at a speed, shape (2, 8), with a zero row for a failed actuator."""
     import control  # noqa: PLC0415 - takes longer to import than a run takes to start
 
     a, b = model(car, parameters, servo_lag_s, speed_mps, interval_s)

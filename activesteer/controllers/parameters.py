@@ -72,7 +72,7 @@ class LqrParameters:
     decay_s: _Lag
     """Time in which it then decays to zero [s]."""
     lacking_radps: _Scale
-    """Error of the yaw rate from which the superposition does not turn the car further from the desired one [rad/s]."""
+    """Yaw rate error from which the superposition does not turn the car further from the desired yaw rate [rad/s]."""
     relaxation_length_m: _Length
     """Distance over which a tyre of the model builds up its force [m]."""
     moment_scale_Nm: _Size
@@ -156,8 +156,8 @@ class IntegratedParameters:
     side_sideslip_rad: _Scale
     """Sideslip error at which this pressure difference is zero [rad]."""
     side_acceleration_mps2: _Scale
-    """Lateral acceleration of a turn at which this pressure difference is zero. The difference falls from half of this
-    value on [m/s2]."""
+    """Lateral acceleration of a turn at which this pressure difference is zero; it falls from half of that on
+    [m/s2]."""
     tolerance_rad: _Limit
     """Distance of an actuator from its demand that is tolerated [rad]."""
     window_s: _Lag
@@ -264,7 +264,7 @@ class ControllerParameters:
     tv: TorqueVectoringParameters = field(default_factory=partial(file_gains, "tv", TorqueVectoringParameters))
     """Torque vectoring."""
     estimator: EstimatorParameters = EstimatorParameters()
-    """Estimator of speed, sideslip and friction, for controllers that use one."""
+    """Estimator of speed, sideslip and friction, for controllers that use an estimator."""
     interval_s: Annotated[float, Range(1e-4, 0.1)] | None = None
     """Time between two calls of a controller, in whole steps of the simulation [s]. Default: the controller's own
     `interval_s`, or every step."""

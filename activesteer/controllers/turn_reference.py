@@ -123,7 +123,7 @@ class ConfidenceMonitor(NativeBlock):
     _authority: float
 
     def __init__(self, setup: ControllerSetup) -> None:
-        """Compute the constants."""
+        """Compute the constants of the monitor."""
         self._prior = setup.gains.estimator.friction_std
         self._fraction = -math.expm1(-setup.timestep_s / _AVERAGED_S)
         self._fall, self._rise = setup.timestep_s / _FALL_S, setup.timestep_s / _RISE_S

@@ -30,7 +30,7 @@ class VariantFile(ControllerParameters):
     name: str = ""
     """Short name for tables; default: the file's name."""
     title: str = ""
-    """One line for lists."""
+    """Title in one line, for lists."""
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,7 @@ TIME_S: Final = 0.01
 TRACK_M: Final = 0.05
 """Difference of two tracks [m]: differential satellite positioning gives each track to 0.02 m."""
 STEERING_WHEEL_RAD: Final = math.radians(5.0)
-"""Difference of two steering wheel angles [rad]: about the smallest difference that a driver notices while turning the
-wheel."""
+"""Difference of two steering wheel angles [rad]: about what a driver notices while turning the wheel."""
 
 FRICTION_UTILISATION: Final = ("friction_utilisation_max", "friction_utilisation_mean")
 RENAMED: Final = {f"tyre_use_{end}": f"friction_utilisation_{end}" for end in ("max", "mean")}
@@ -294,7 +293,7 @@ METRICS: Final = {
 
 
 def metric(name: str) -> Metric:
-    """Return a declared metric."""
+    """Return a metric by its name."""
     if name in RENAMED:
         raise ParameterError(f"this metric is now {RENAMED[name]}", value=name)
     if name not in METRICS:

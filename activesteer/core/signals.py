@@ -28,8 +28,8 @@ class _Make(Protocol):
 
 
 new_message: Final = cast(_Make, tuple.__new__)
-"""Fast creation of messages: `new_message(Motion, (x_m, ...))` takes half the time of `Motion(x_m, ...)`. It needs a
-value for every field."""
+"""Fast constructor: `new_message(Motion, (x_m, ...))` takes half the time of `Motion(x_m, ...)`. All values are
+needed."""
 
 CORNERS_IN_WORDS: Final = dict(zip(CORNERS, ("front left", "front right", "rear left", "rear right"), strict=True))
 """Names of the corners in a sentence."""

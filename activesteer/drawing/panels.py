@@ -182,7 +182,7 @@ VIEWS: Final = {
     BODY: ("lateral", "roll", "longitudinal"),
     WHEELS: ("wheel_load", "friction_utilisation", "lateral_force", "longitudinal_force", "brake_pressure"),
 }  # fmt: skip
-"""View -> its panels in their order. A report and Explore show those that a run has, in pairs."""
+"""Panels of each view, in their order. A report and Explore show the panels that a run has, in pairs."""
 
 
 def panels_in(view: str) -> tuple[Panel, ...]:

@@ -18,7 +18,7 @@ class DriverParameters:
     name: str = ""
     """Short name, for tables. Default: the file's name."""
     title: str = ""
-    """One line for lists."""
+    """Title in one line, for lists."""
     preview_s: Annotated[float, Range(0.2, 5.0)]
     """Time ahead for which the driver sees the path [s]. Beyond this time, the driver assumes a straight path."""
     preview_points: Literal["all", "one"] = "all"

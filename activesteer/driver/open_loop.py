@@ -11,7 +11,7 @@ from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
 
 _STANDSTILL_MPS: Final = 0.05
-"""Speed below which a car that shall stand needs no torque [m/s]."""
+"""Speed below which a car that is to stand needs no torque [m/s]."""
 
 
 class SpeedHold(NativeBlock):

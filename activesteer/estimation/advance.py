@@ -79,8 +79,7 @@ _SLIDING_MPS2: Final = 1.0
 """Slip of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow; fraction of the friction that a car with
 sliding wheels uses; least deceleration [m/s2]."""
 _ALIKE: Final = 0.6
-"""Ratio of the used friction of both sides below which the road has two frictions, so that no number is right for
-both."""
+"""Ratio of the used friction of both sides below which the road has two frictions, and one number is wrong."""
 
 
 @inlined

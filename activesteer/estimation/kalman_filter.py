@@ -79,11 +79,12 @@ _MOST_BRAKED: Final = 0.25
 brakes then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
 _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
-make slip angles of 0.05 to 0.10 deg RMS (compact, sedan) that the model does not know; this is three times as much."""
+cause slip angles of 0.05 to 0.10 deg RMS (compact, sedan), which the model does not know. This limit is three times as
+large."""
 _SURPRISING: Final = 4.0
 """Squared error over its expected variance above which a value is not used for the stiffness and for the offset of the
 accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
-offset by 0.34 m/s2, six of its standard deviations, and the friction behind the snow was too low by 0.1."""
+offset by 0.34 m/s2, six of its standard deviations. The friction behind the snow was then too low by 0.1."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth of a
 second one axle is still on the old one. Chosen from 0.1, 0.2 and 0.3 by the error of the sideslip angle."""

@@ -36,8 +36,8 @@ class EstimatorParameters:
     Chosen."""
     friction_fraction: _NotNegative = 0.05
     """Standard deviation of the observed friction per friction, in the estimate only: the model's tyre is upright. At
-    the limit of a ramp of the steering wheel, the inclination of 2 to 3 deg by roll takes 2 to 3 % (compact) and 7 to
-    10 % (Tesla) of the lateral force of an outer wheel. Such an error does not average out."""
+    the limit of a ramp of the steering wheel, the inclination of 2 to 3 deg by roll reduces the lateral force of an
+    outer wheel by 2 to 3 % (compact) and 7 to 10 % (Tesla). Such an error does not average out."""
     friction_s: _Positive = 10.0
     """Time constant with which the friction returns to the assumed value [s]."""
     slip_angle_std_rad: _Positive = math.radians(0.05)

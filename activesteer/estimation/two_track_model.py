@@ -62,14 +62,14 @@ LARGEST_RATIO: Final = 1.5
 """Bounds of the friction of the rear tyres relative to the friction of the front tyres [-]."""
 LEAST_STIFFNESS: Final = 0.3
 LARGEST_STIFFNESS: Final = 2.0
-"""Bounds of the estimated stiffness of the tyres relative to new ones [-]."""
+"""Bounds of the estimated stiffness of the tyres relative to new tyres [-]."""
 SLOWEST_MPS: Final = 3.0
 """Below this speed the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
 _LEAST_LEFT: Final = 0.5
 """Smallest fraction of its friction that a wheel keeps for lateral force, for any longitudinal force. By the compact's
 Magic Formula, at 1 to 6 deg, 0.65 to 0.72 of the lateral force remain at a slip of 12 %, where the brake force is
-largest, and 0.45 to 0.53 at 20 %, which an anti-lock system allows at times. The circle with one half leaves 0.92 to
-0.51."""
+largest. At 20 %, which an anti-lock system allows at times, 0.45 to 0.53 remain. The circle with one half leaves 0.92
+to 0.51."""
 _CREEP_S: Final = 0.3
 """Time constant of the yaw rate of an almost standing car [s]."""
 _LONGEST_STEP_S: Final = 0.005

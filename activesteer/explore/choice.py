@@ -105,7 +105,7 @@ def titles() -> dict[str, str]:
 
 
 def _content_of(file: Path) -> Iterator[tuple[str, str]]:
-    """Yield the lists that offer a file, with the ending of its name, without executing its code."""
+    """Yield the lists that offer a file, and the ending of its name in each list, without executing its code."""
     text = file.read_text("utf-8")
     if file.suffix == ".toml":
         table = tomllib.loads(text)

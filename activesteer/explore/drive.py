@@ -280,7 +280,7 @@ class DriveSession:
         return math.atan2(motion.y_m - self._course.radius_m, motion.x_m)
 
     def _time_laps(self) -> None:
-        """Measure the time of a lap of the circle, or from the first gate to the last one."""
+        """Measure the time of a lap of the circle, or from the first gate to the last gate."""
         now_s, course = self._simulation.time_s, self._simulation.scenario.maneuver.course
         if self._course.radius_m:
             bearing = self._bearing()

@@ -129,7 +129,7 @@ class Search:
     """Search for a steering wheel angle by driving the car without control."""
 
     probe: Maneuver
-    """The manoeuvre that is driven: step steers, whose steady state counts, or one slow ramp to the left."""
+    """Manoeuvre to drive: step steers, whose steady state counts, or one slow ramp to the left."""
     lateral_acceleration_mps2: float
     """Lateral acceleration to reach [m/s2], left positive."""
     accept: Callable[[float], Maneuver]

@@ -23,8 +23,7 @@ from activesteer.road.course import Course
 from activesteer.road.native_path import PathSearch
 
 _WINDOW_M: Final = 5.0
-"""Distance along the path to either side of the car's last position in which its position is searched [m]. A path may
-therefore cross itself."""
+"""Distance to either side of the last position in which the car is searched [m]. A path may therefore cross itself."""
 _COAST_MPS2: Final = 0.7
 """Deceleration that drag and engine give without the brake [m/s2]."""
 _PEDAL_PER_MPS2: Final = 1.0 / 13.0
@@ -42,10 +41,10 @@ OPTIONAL: Final = ("speed_mps", "width_m")
 
 MIN_POINTS: Final = 4
 _MAX_GAP_M: Final = 20.0
-"""Largest distance between two points. A larger one counts as a jump [m]."""
+"""Largest distance between two points. A larger gap counts as a jump [m]."""
 _MIN_GAP_M: Final = 1e-3
 _MAX_TURN_RAD: Final = math.radians(90.0)
-"""Largest turn at a point. A larger one counts as going back [rad]."""
+"""Largest turn at a point. A larger turn counts as going back [rad]."""
 _MIN_RADIUS_M: Final = 6.0
 """Smallest radius. A tighter bend counts as a kink. A car of the compact class turns on 5.2 m [m]."""
 _MAX_START_M: Final = 1.0
@@ -145,7 +144,7 @@ class PathTable:
     """Points in the order of travel, from (0, 0) along x."""
 
     csv: str | None = None
-    """CSV file with the columns x_m and y_m, and, optionally, speed_mps (or speed_kmh) and width_m: a path, or a name
+    """CSV file with the columns x_m and y_m, optionally also speed_mps (or speed_kmh) and width_m: a path, or a name
     in the manoeuvre's folder."""
     x_m: tuple[float, ...] | None = None
     """World x of the points [m]. Default: the points of the CSV."""

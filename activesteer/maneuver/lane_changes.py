@@ -261,7 +261,7 @@ class LaneLayout:
 
 @dataclass(frozen=True, kw_only=True)
 class LaneChange(AlongCourse, kind="lane_change"):
-    """A double lane change."""
+    """Double lane change of ISO 3888-1 or -2."""
 
     lane: LaneLayout = LaneLayout()
     """Lanes, and the path through them."""

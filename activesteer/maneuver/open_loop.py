@@ -58,7 +58,7 @@ class SpeedTable:
     time_s: tuple[float, ...]
     """Times, increasing [s]; linear between them, constant outside."""
     speed_mps: tuple[float, ...]
-    """Speeds [m/s]."""
+    """Speeds to hold [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -108,19 +108,19 @@ class WheelTorqueTable:
     fl_drive_Nm: tuple[float, ...] | None = None
     """Drive torque, front left, positive forwards [N m]."""
     fr_drive_Nm: tuple[float, ...] | None = None
-    """Front right."""
+    """Drive torque, front right [N m]."""
     rl_drive_Nm: tuple[float, ...] | None = None
-    """Rear left."""
+    """Drive torque, rear left [N m]."""
     rr_drive_Nm: tuple[float, ...] | None = None
-    """Rear right."""
+    """Drive torque, rear right [N m]."""
     fl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
     """Brake torque, front left, against the rotation [N m]. The limits of the car's brakes apply."""
     fr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
-    """Front right."""
+    """Brake torque, front right [N m]."""
     rl_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
-    """Rear left."""
+    """Brake torque, rear left [N m]."""
     rr_brake_Nm: Annotated[tuple[float, ...] | None, Range(0.0)] = None
-    """Rear right."""
+    """Brake torque, rear right [N m]."""
 
     def at(self, time_s: float) -> WheelTorques:
         """Return the torques at a time [s]."""

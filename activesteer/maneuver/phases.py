@@ -103,8 +103,7 @@ class Phase:
     steering_wheel_rad: Annotated[float, Range(-15.0, 15.0)] | None = None
     """Steering wheel angle at the end of the phase, positive in the direction of the manoeuvre [rad]."""
     steering_factor: Annotated[float, Range(-15.0, 15.0)] | None = None
-    """This angle as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control
-    [-]."""
+    """Angle as a multiple of A, the steering wheel angle at 0.3 g in a slow ramp of the car without control [-]."""
     steering_rate_radps: Annotated[float, Range(0.01, 40.0)] | None = None
     """Rate of the steering wheel [rad/s]. Default: 500 deg/s, or by `steering_time_s`."""
     steering_time_s: _Ramp | None = None

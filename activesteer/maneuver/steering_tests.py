@@ -51,7 +51,7 @@ class StepSteer(Maneuver, kind="step_steer"):
     """A step of the steering wheel angle, ramped at a limited rate."""
 
     steer: StepInput
-    """The step."""
+    """Step of the steering wheel."""
 
     def __post_init__(self) -> None:
         """Check that the step starts before the end of the run, and the speed of a search for its amplitude."""
@@ -123,7 +123,7 @@ class SineSweep(Maneuver, kind="sine_sweep"):
     """A sine of constant amplitude and rising frequency at constant speed."""
 
     sweep: Sweep = Sweep()
-    """The sweep."""
+    """Sweep of the steering wheel."""
 
     def __post_init__(self) -> None:
         """Check that the frequency rises and that the sweep ends within the run."""
@@ -177,7 +177,7 @@ class SlowlyIncreasingSteer(Maneuver, kind="slowly_increasing_steer"):
     """A slow ramp of the steering wheel angle at constant speed, up to the limit of the car."""
 
     steer: SlowRamp = SlowRamp()
-    """The ramp."""
+    """Ramp of the steering wheel."""
 
     def __post_init__(self) -> None:
         """Check that the ramp begins within the run and turns the steering wheel."""
@@ -221,7 +221,7 @@ class RandomSteer(Maneuver, kind="random_steer"):
     """Random steering at constant speed."""
 
     random: RandomSignal = RandomSignal()
-    """The angle."""
+    """Random steering wheel angle."""
 
     def __post_init__(self) -> None:
         """Check that the band is wide enough for the run. A sum of few sines is not random."""
@@ -315,7 +315,7 @@ class SineWithDwell(Maneuver, kind="sine_with_dwell"):
     """A sine with dwell, with the speed held until the sine begins."""
 
     steer: DwellInput
-    """The sine."""
+    """Sine with dwell of the steering wheel."""
     drive: DriveMode = "coast"
     """Drive from the start of the sine: `coast`, which FMVSS 126 requires, or `hold_speed`."""
 

@@ -202,7 +202,7 @@ def read_columns(path: Path) -> list[Column]:
 
 
 def _numbered(columns: list[Column]) -> list[Column]:
-    """Number repeated column names, from the second one on."""
+    """Number repeated column names, starting with the second occurrence."""
     seen: dict[str, int] = {}
     found = []
     for column in columns:

@@ -22,16 +22,14 @@ from activesteer.measured.signals import at_sensor
 from activesteer.recording import Recording
 
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
-"""Channels that align the clocks if both runs have them: the response of another car may lag, but its input does
-not."""
+"""Channels that align the clocks if both runs have them: another car's response may lag, but not its input."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 _SEEN: Final = 1e-3
 """Noise relative to the tolerance below which a table leaves the noise out."""
 _STEP_S: Final = 0.01
 """Step of the search [s]. The result is found between its sample times."""
 _NEARLY: Final = 0.01
-"""Range of correlations below the best one that count as equal, such as all periods of a sine. The shortest of these
-shifts is taken."""
+"""Loss of correlation up to which shifts count as equal, such as all periods of a sine. The shortest is taken."""
 
 
 def time_shift(measured: Recording, simulated: Recording) -> float:

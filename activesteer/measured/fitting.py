@@ -136,8 +136,7 @@ AT_END: Final = 1e-3
 """A parameter this close to an end of its range is at that end."""
 
 Answer = list[Array] | str
-"""Differences of every channel of every recording for a set of parameters, or the reason why the set cannot be
-driven."""
+"""Differences of every channel of every recording for a set of parameters, or the reason why it cannot be driven."""
 
 
 class Found(NamedTuple):

@@ -51,8 +51,7 @@ class QuantityTable:
     """A compared channel, with numbers in the unit of its key."""
 
     noise: Annotated[float, Range(1e-12)] | None = None
-    """Standard deviation of the noise, which sets the weight of the channel in fits. By default the channel is not used
-    in fits."""
+    """Standard deviation of the noise: the channel's weight in fits. By default the channel is not used in fits."""
     offset: Annotated[float, Range(0.0)] | None = None
     """Constant part of the tolerance; by default the tolerance of `activesteer compare`."""
     gain: Annotated[float, Range(0.0)] | None = None
@@ -118,9 +117,9 @@ class MeasuredTable:
     vehicle: str
     """Name or file of the car."""
     runs: tuple[RunTable, ...] = ()
-    """The measured runs."""
+    """Measured runs, in place of a circle."""
     circle: CircleTable | None = None
-    """The measured circle, in place of runs."""
+    """Measured circle, in place of runs."""
     quantities: dict[str, QuantityTable] = field(default_factory=dict)
     """Comparison of each channel, which may be in any unit."""
     title: str = ""

@@ -41,7 +41,7 @@ class ChannelMap:
     offset: float = 0.0
     """Offset added to the column, in its unit, before the scale."""
     zero_until_s: Annotated[float, Range(0.0)] | None = None
-    """The mean of the column before this time is subtracted."""
+    """End of the time over which the mean of the column is taken, which is then subtracted [s]."""
 
 
 @dataclass(frozen=True)

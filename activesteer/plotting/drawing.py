@@ -179,7 +179,7 @@ def _set_axes(axis: Axes, panel: Panel) -> None:
 
 
 def _add_abscissa(axis: Axes, label: str, first: Array, second: Array) -> None:
-    """Add a second abscissa above a panel, with values that increase with the first ones."""
+    """Add a second abscissa above a panel, with values that increase with the first abscissa."""
 
     def to_second(x: ArrayLike) -> ArrayLike:
         return np.interp(np.asarray(x), first, second)

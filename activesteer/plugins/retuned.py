@@ -20,7 +20,7 @@ _WHOLE: Final = (type, ModuleType, FunctionType, BuiltinFunctionType, MethodType
 
 
 def retuned(running: Any, before: Any, after: Any) -> Any:
-    """Return a block with new parameters and the memory of a running one."""
+    """Return a block with new parameters and the memory of a running block."""
     return _kept(running, before, after, set())
 
 

@@ -355,7 +355,7 @@ class Link(NamedTuple):
 
 
 ScenePart = Primitive | Link
-"""Part of a scene."""
+"""Part of a scene: a solid or a link."""
 
 
 def encode_scene(parts: Iterable[ScenePart]) -> bytes:

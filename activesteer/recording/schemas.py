@@ -31,7 +31,7 @@ from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError, nearest_names
 
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
-"""Wire types."""
+"""Wire types of protobuf."""
 
 STAMP_LENGTH = 12
 """Length of a google.protobuf.Timestamp made by `timestamps` [bytes]."""

@@ -37,7 +37,7 @@ _SLICE_M: Final = 2.0
 """Length of the pieces in which a patch along a path is drawn [m], at most `_MAX_SLICES` of them."""
 _MAX_SLICES: Final = 200
 _EDGE_POINTS: Final = 31
-"""Points of the edge of an obstacle, so that a border of the drawing cuts a turned one within some centimetres."""
+"""Points of the edge of an obstacle: a border of the drawing cuts a rotated obstacle within some centimetres."""
 _SHOWN_BESIDE_M: Final = 4.0
 """Width to either side of the path in which its friction is drawn [m]. The friction also counts further out."""
 

@@ -216,7 +216,7 @@ class VehicleConfig(VehicleParameters):
     two_track: TwoTrackParameters | None = None
     """Further properties for estimators. A car without this table has no estimator."""
     controllers: ControllerParameters = field(default_factory=ControllerParameters)
-    """Gains and limits."""
+    """Gains and limits of the controllers."""
     KEY_HINTS: ClassVar = VehicleParameters.KEY_HINTS | {"driver": _DRIVER_HINT}
 
 

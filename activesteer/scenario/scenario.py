@@ -190,8 +190,7 @@ _IN_TITLES: Final[dict[tuple[str, ...], tuple[str, str, float]]] = {
     ("cones", "spacing_m"): (r"[\d.]+ m\b", "{:.3g} m", 1.0),
     ("road", "mu"): (r"\b(dry|slippery)\b", "friction {:.3g}", 1.0),
 }
-"""Pattern of a field's value in a title, text of a driven value, and unit of this text in SI, by field of a
-manoeuvre."""
+"""Pattern of a value in a title, text of a driven value, and unit of this text in SI, by field of a manoeuvre."""
 
 
 def _with_changes_in_title(built: Maneuver, of_file: Mapping[str, Any], changed: Sequence[tuple[str, ...]]) -> Maneuver:
@@ -389,7 +388,7 @@ def _maneuver(before: Maneuver, key: str, path: list[str], value: Any, time_s: f
 
 
 def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
-    """Return a manoeuvre with the course object of another one, so that a driver stays on the path."""
+    """Return a manoeuvre with the course object of another manoeuvre, so that a driver stays on the path."""
     if before.course is not None:
         vars(after)["course"] = before.course
     return after
@@ -398,7 +397,7 @@ def _same_course(before: Maneuver, after: Maneuver) -> Maneuver:
 _LONGEST: Final = 200_000
 """Largest number of points of a table. A longer recording is thinned."""
 _ON_GROUND: Final = 0.5
-"""Minimum speed of a manoeuvre with a moving car [m/s]."""
+"""Smallest speed of a manoeuvre with a moving car [m/s]."""
 
 
 def is_recording(maneuver: object) -> TypeGuard[str | os.PathLike[str]]:

@@ -38,7 +38,7 @@ class Sensor:
     bandwidth_Hz: _Bandwidth | None = None
     """Corner frequency (-3 dB) of a first-order low-pass before sampling [Hz]."""
     sample_time_s: _SampleTime | None = None
-    """Time between two samples, in whole steps of the simulation. The output is held between [s]."""
+    """Time between two samples, in whole steps of the simulation. The output is held in between [s]."""
     delay_s: _Delay | None = None
     """Delay from the sample to the output, in whole steps of the simulation [s]."""
 
@@ -114,12 +114,12 @@ class AngleSensor(Sensor):
 RANDOM: Final = ("noise", "bias", "drift")
 """First words of the keys whose values are drawn from the seed."""
 _KINDS: Final = {"radps": RateSensor, "mps2": AccelerationSensor, "rad": AngleSensor, "Pa": PressureSensor}
-"""Unit of a field of `Measurement` -> the kind of its sensor."""
+"""Kind of sensor for each unit of a field of `Measurement`."""
 
 
 @dataclass_transform(frozen_default=True)
 def _with_sensors(cls: type[_Class]) -> type[_Class]:
-    """Decorator: convert a class into a frozen dataclass with an ideal sensor in each field."""
+    """Convert a class into a frozen dataclass with an ideal sensor in each field, as a decorator."""
     for field, width in zip(Measurement._fields, widths_of(Measurement), strict=True):
         name, _, unit = field.rpartition("_")
         if unit in _KINDS:  # time and speed have none
@@ -148,7 +148,7 @@ class Sensors:
     seed: Annotated[int, Range(0, 2**32 - 1)] | None = None
     """Seed of noise, bias and drift. Default 0. It has no effect if no sensor has any of these."""
     speed_from_wheels: bool | None = None
-    """Whether the speed comes from the undriven wheels (from all wheels if all are driven) times their rolling radius.
+    """True if the speed comes from the undriven wheels (from all wheels if all are driven) times their rolling radius.
     Otherwise it is the car's true speed."""
 
     if TYPE_CHECKING:

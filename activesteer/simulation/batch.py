@@ -36,7 +36,7 @@ from activesteer.simulation.preparation import prepared
 from activesteer.vehicle import engine_warnings_held
 
 MAX_CARS: Final = 100_000
-"""Most cars of a batch."""
+"""Largest number of cars in a batch."""
 _LEAST_STEPS: Final = 40
 """Car-steps below which a second thread costs more than it saves."""
 _MOST_STEPS: Final = 2**40

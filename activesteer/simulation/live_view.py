@@ -24,9 +24,9 @@ from activesteer.video import FilmedCar, RenderScene
 from activesteer.video.film import CUTAWAY
 
 FRAME_S: Final = 0.016
-"""Minimum time between two frames [s]: a screen shows 60 per second."""
+"""Shortest time between two frames [s]: a screen shows 60 per second."""
 _MAX_S: Final = 0.1
-"""Maximum time between two frames [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
+"""Longest time between two frames [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
 instead of jerky."""
 _SLOWER: Final = (ord("-"), 333)
 _FASTER: Final = (ord("="), ord("+"), 334)

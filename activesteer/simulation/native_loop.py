@@ -32,14 +32,14 @@ DRIVE, CONTROL, PASS_ON = range(3)
 """Stages of a step, each of which a car can stop before: the driver; the controller; its bus, and the car."""
 DONE, NEEDS_BLOCKS, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS = range(5)
 NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(5, 9)
-"""Why a car has stopped: all its steps are made. Driver and controller are not in the record. A fault begins or ends.
-The tape has no room. The next setpoints, the driver's gains at a new speed, the driver's or the controller's command
-are needed. A value is implausibly large."""
+"""Reasons why a car has stopped: its steps are done; it needs its driver and controller in the record; a fault begins
+or ends; the tape is full. It needs the next setpoints, the driver's gains at a new speed, the driver's command, or the
+controller's command; or a value is implausibly large."""
 
 MESSAGES: Final[dict[str, type[Any]]] = {
     "driver_command": DriverCommand, "actuator_command": ActuatorCommand, "measurement": Measurement, "motion": Motion,
 }  # fmt: skip
-"""Field of `CAR` with the numbers of a message -> the message."""
+"""Messages by the field of `CAR` that holds their numbers."""
 CAR: Final = np.dtype(
     (
         np.record,
@@ -145,7 +145,7 @@ def _control(car):
 
 @inlined
 def _pass_on(car):
-    """Send the held command over the bus, and receive the arriving one."""
+    """Send the held command over the bus, and receive the arriving command."""
     length, bus = car.on_bus + 1, array_of(car.bus)
     newest, oldest = car.calls % length * N_HELD, (car.calls + 1) % length * N_HELD
     for place in range(N_HELD):

@@ -11,7 +11,7 @@ from activesteer.config import Range, checked_number
 
 FACTOR: Final = Range(0.01, 100.0)
 LATE_S: Final = 0.2e-3
-"""A step that begins later than this counts as late [s]."""
+"""Delay from which a step counts as late [s]."""
 _SPIN_S: Final = 0.15e-3
 """Time before a deadline from which the clock is polled, since a sleep ends about 0.1 ms late [s]."""
 

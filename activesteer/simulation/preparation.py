@@ -48,7 +48,7 @@ from activesteer.theory.single_track import IDENTIFIED, IDENTIFY, SingleTrackPar
 from activesteer.vehicle.statics import mass_properties
 
 MAX_KEPT: Final = 1000
-"""Maximum of numbers in the process and in the folder. The oldest are deleted first."""
+"""Largest number of amplitudes in the process and in the folder. The oldest are deleted first."""
 _MAX_BYTES: Final = 200
 _SUFFIX: Final = ".amplitude"
 _in_process: dict[str, float] = {}
@@ -126,7 +126,7 @@ _STEADY_S: Final = 0.5
 _CHUNK_S: Final = 0.25
 """Interval between two checks of whether a ramp has reached its end [s]."""
 _ROUNDED_RAD: Final = math.radians(0.1)
-"""FMVSS 126 rounds A to 0.1 deg, so that A is the same on every machine."""
+"""Resolution of A in FMVSS 126 [rad]: 0.1 deg, so that A is the same on every machine."""
 
 
 def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
@@ -241,7 +241,7 @@ Run = Callable[[Scenario], RecordingLike]
 """Function that runs a scenario. An argument, because the runner itself calls this module."""
 
 CONSTANT_SPEED_TESTS: Final = {"80 km/h": 80.0, "100 km/h": 100.0}
-"""Tests at constant speed that give the single-track model: name -> speed [km/h]."""
+"""Tests at constant speed that give the single-track model, with the speed of each test [km/h]."""
 _LINEAR: Final = {"duration_s": 12.0, "steer.end_deg": 50.0}
 """Overrides that limit a test at constant speed to the linear range."""
 

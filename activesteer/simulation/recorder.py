@@ -115,7 +115,7 @@ class Recorder(Uncopyable):
             self._take()
 
     def _rewind(self) -> None:
-        """Direct the next row to the start of the tape, and the next pose to the end of the stored ones."""
+        """Direct the next row to the start of the tape, and the next pose to the end of the stored poses."""
         tape, kept = self._tape, self._kept
         self.tape.memory = self._raw, kept
         pose = self._poses_before(self._taken) - self._poses_before(self._first)

@@ -29,7 +29,7 @@ def _read() -> dict[str, Standard]:
 
 
 STANDARDS: Final = _read()
-"""Name -> standard."""
+"""Standards by name."""
 
 
 def standard_of(name: str) -> Standard:

@@ -36,7 +36,7 @@ EXAMINED_BY: Final[dict[str, Callable[[StandardRunner], Findings]]] = {
     "iso21994": braking.stop,
     "r79-circle": r79_circle.examine,
 }
-"""Name of a standard -> function that drives and evaluates one car with one controller. A run that fails is a row;
+"""Functions that drive and evaluate one car with one controller, by name of the standard. A run that fails is a row;
 without any result the function raises `NoResult`."""
 
 
@@ -114,7 +114,7 @@ def examine(
 
 
 _WIDE, _THIN, _LINE = 3.6, 1.0, 1.4
-"""Widths of the first and of the second curve of a controller, and of a single one [pt]. Both sides may coincide."""
+"""Widths of the first and of the second curve of a controller, and of a single curve [pt]. Both sides may coincide."""
 _SIDES: Final = 2
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
@@ -174,7 +174,7 @@ def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
 
 
 def _overlays(parts: Sequence[Panel | Heat]) -> bool:
-    """Return whether the panels of several controllers remain legible as one."""
+    """Return whether the panels of several controllers remain legible in one panel."""
     return all(
         isinstance(panel, Panel)
         and len(panel.curves) <= _SIDES

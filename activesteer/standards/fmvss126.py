@@ -25,7 +25,7 @@ DISPLACED_FROM: Final = 5.0
 LEAST_DISPLACEMENT_M: Final = 1.83
 LEAST_HEAVY_DISPLACEMENT_M: Final = 1.52
 HEAVY_KG: Final = 3500.0
-"""Required displacements [m], and mass above which the smaller one suffices [kg]."""
+"""Required displacements [m], and mass above which the smaller displacement suffices [kg]."""
 RATIOS: Final = ("yaw_ratio_1s", "yaw_ratio_175s")
 _METRICS: Final = ("yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share")
 _BEGIN_S: Final = 1.5

@@ -12,7 +12,7 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import SIDES, Findings, StandardRun, StandardRunner, cell, time_panels
 
 MARGINS_M: Final = (0.1, 0.15, 0.2)
-"""Margins of the lines at every speed [m]. The best one depends on car and speed."""
+"""Margins of the lines at every speed [m]. The best margin depends on car and speed."""
 THROTTLE_OFF_M: Final = 2.0
 """Distance into the entry lane after which the throttle is released [m]."""
 COARSE_KMH: Final = (35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0)

@@ -43,7 +43,7 @@ EFFORTS: Final = {
     "intact": Effort(12.0, 150.0, {}),
     "power_assist_failed": Effort(20.0, 300.0, {"steering.assist_fraction": 0.0}),
 }
-"""Name -> requirement for the steering effort."""
+"""Requirements for the steering effort, by name."""
 WITHIN_S: Final = 4.0
 """Time in which the car must reach the radius [s]."""
 SPEED_KMH: Final = 10.0
@@ -252,16 +252,16 @@ RADIUS_M: Final = 100.0
 SPEED_MPS: Final = 80.0 / 3.6
 """Speed in the circle [m/s]."""
 YAW_RATE_RADPS: Final = math.radians(3.0)
-"""Largest change of the yaw rate [rad/s]. Drivers control steps of 2 to 5 deg/s and 1 m/s2: assumptions both."""
+"""Largest change of the yaw rate [rad/s]. Drivers control steps of 2 to 5 deg/s and 1 m/s2: both are assumptions."""
 AY_MPS2: Final = 1.0
 """Largest change of the lateral acceleration [m/s2]."""
 LANE_M: Final = 3.5
-"""Width of the lane, in whose middle the car is [m]. Its edge is the largest lateral offset after 1 s."""
+"""Width of the lane, with the car in its middle [m]. Its edge is the largest lateral offset after 1 s."""
 _ENTRY_S: Final = 2.0
 _FAULT_S: Final = _ENTRY_S + 2.5
 """Time at which the fault begins, in the steady circle [s]."""
 _WINDOW_S: Final = 2.0
-"""Evaluated time after it [s]."""
+"""Evaluated time after the start of the fault [s]."""
 _SPACING_M: Final = 1.0
 OFFSET_AT_S: Final = 1.0
 """Time after the start of a fault at which the lateral offset is taken [s]."""

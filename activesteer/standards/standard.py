@@ -25,7 +25,7 @@ from activesteer.studies.engine.workers import Workers
 _LEAD_S: Final = 0.2
 """Time by which a curve begins before time zero [s]."""
 SIDES: Final = {"left": 1.0, "right": -1.0}
-"""Side of the steering -> sign of the steering wheel angle, ISO 8855."""
+"""Sign of the steering wheel angle for each side of the steering (ISO 8855)."""
 
 
 class NoResult(ManeuverError):  # noqa: N818 - named as the outcome of a test

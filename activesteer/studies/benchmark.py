@@ -31,7 +31,7 @@ from activesteer.vehicle import force_block as fb
 from activesteer.vehicle.native_forces import install_native_forces, remove_native_forces
 
 ROUNDS: Final = 5
-"""Rounds. The best one counts, because a disturbance only makes a machine slower."""
+"""Number of rounds. The best one counts, because a disturbance only makes a machine slower."""
 _CALLS: Final = 5000
 _CONTROLLER: Final = "ars"
 """The most expensive of the paper's controllers."""
@@ -215,7 +215,7 @@ _CAR_STEPS: Final = 51_200
 _INTERVAL: Final = 10
 """Steps between two commands of the law in Python."""
 _REAR_PER_YAW_RATE_S: Final = 0.05
-"""Rear wheel angle of this law over the yaw rate [s]."""
+"""Rear wheel angle of this law per yaw rate [s]."""
 
 
 def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:

@@ -34,7 +34,7 @@ from activesteer.studies.linear.identification import single_track_response
 from activesteer.studies.linear.linearisation import linear_response, linearise
 
 Progress = Callable[[str, int, int], None]
-"""Called with the finished run, the number of finished runs, and the total."""
+"""Callback with the finished run, the number of finished runs, and the total."""
 
 
 @dataclass

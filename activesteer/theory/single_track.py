@@ -55,7 +55,7 @@ class SingleTrackParameters:
     characteristic_speed_mps: _Positive | None = None
     """Characteristic speed v_ch from a test of the car [m/s]; default by eq. 4."""
     source: str = "file"
-    """`file`: the parameters are as given, whatever the car carries. `identify`: the car is driven before the run, and
+    """`file`: the parameters are as given, for any load of the car. `identify`: the car is driven before the run, and
     the identified parameters replace them. `identified`: they are the result of such a drive."""
 
     def __post_init__(self) -> None:
@@ -76,7 +76,7 @@ class SingleTrackParameters:
 
 
 def characteristic_speed(wheelbase_m: float, understeer_gradient_radpmps2: float) -> float:
-    """Return the speed where an understeering car reaches half the yaw rate of a neutral one, sqrt(l/EG).
+    """Return the speed where an understeering car reaches half the yaw rate of a neutral car, sqrt(l/EG).
 
     Args:
         wheelbase_m: l [m].
@@ -247,7 +247,7 @@ class TwoTrackParameters:
     """Lateral speed of the front wheels per roll rate, relative to the centre of gravity, at the points whose slip the
     tyres feel [m]. Such a point is the contact point, or the wheel centre by `tyres.conventions.slip_velocity`."""
     rear_roll_arm_m: Annotated[float, Range(-2.0, 2.0)]
-    """The same of the rear wheels [m]."""
+    """The same for the rear wheels [m]."""
     pitch_gradient_radpmps2: Annotated[float, Range(0.0, 0.1)]
     """Pitch angle per deceleration, nose down [rad/(m/s2)]."""
     wheel_inertia_kgm2: _Positive = 1.0

@@ -24,7 +24,7 @@ from activesteer.tyre.tyre_parameters import TyreParameters
 _BAR_PA: Final = 1e5
 _INCH_M: Final = 0.0254
 _LOADS: Final = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
-"""Loads of the table, over the nominal one."""
+"""Loads of the table, relative to the nominal load."""
 
 
 def _within(params: TyreParameters, low: str, high: str, widest: float, count: int = 801) -> np.ndarray:
@@ -316,7 +316,7 @@ def _relaxation_lengths(formula: MagicFormula) -> Picture:
 
 _CALLS: Final = 100_000
 _ROUNDS: Final = 5
-"""Each figure is the best of this many rounds, since disturbances only slow a machine down."""
+"""Number of rounds, of which each figure takes the best, since disturbances only slow a machine down."""
 
 
 @compiled

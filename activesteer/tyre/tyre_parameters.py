@@ -37,10 +37,10 @@ class TyreConventions:
     """Conventions for a tyre's coefficients, as the table [tyres.conventions] of a vehicle file."""
 
     camber: bool = True
-    """Whether camber enters the formula. Without it, camber still acts by geometry: contact point and direction of
+    """True if camber enters the formula. Without it, camber still acts by geometry: contact point and direction of
     forces."""
     relaxation: bool = True
-    """Whether slip builds up over the relaxation length. Without it, forces follow slip within 20 mm of road, except at
+    """True if slip builds up over the relaxation length. Without it, forces follow slip within 20 mm of road, except at
     walking speed, where the standing tyre needs its carcass."""
     combined_slip: Literal["weights", "friction_ellipse"] = "weights"
     """`weights`: the cosine functions of the formula, which are 1 without R.. coefficients in the file;
@@ -78,9 +78,9 @@ class TyreConventions:
 
 
 _MAX_FORCE: Final = 1e12
-"""No result of a tyre exceeds this [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
+"""Bound of all results of a tyre [N, Nm, m ...]; beyond it, the engine's state soon overflows too."""
 _ENORMOUS: Final = 1e7
-"""No coefficient of a tyre is larger in SI: pressures and stiffnesses are about 1e6."""
+"""Bound of all coefficients of a tyre in SI: pressures and stiffnesses are about 1e6."""
 _TURN_SLIP_1PM: Final = 0.1
 _MF52: Final = 52.0
 

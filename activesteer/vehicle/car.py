@@ -527,7 +527,7 @@ def _raise_if_diverged(model: mujoco.MjModel, data: mujoco.MjData, commands: Arr
 
 
 def _changeable(part: mujoco.MjModel | mujoco.MjOption) -> list[str]:
-    """Names of the numbers that can change at run time in a model, or in its options."""
+    """Return the names of the numbers that can change at run time in a model, or in its options."""
     kinds = (np.ndarray, int, float) if isinstance(part, mujoco.MjOption) else (np.ndarray,)
     return [name for name in dir(part) if not name.startswith("_") and isinstance(getattr(part, name), kinds)]
 

@@ -40,7 +40,7 @@ COORDINATES: Final = ("x", "y", "camber", "caster", "toe")
 """Order of the five coordinates in every array: slides along x and y, hinges about x, y and z."""
 OVER_TRAVEL: Final = ("forward_m", "outwards_m", "camber_rad", "caster_rad", "toe_rad")
 OVER_RACK: Final = ("rack_forward_m", "rack_outwards_m", "rack_camber_rad", "rack_caster_rad", "rack_steer_rad")
-"""Fields with the curves of these coordinates over the rack."""
+"""Fields with the curves of these coordinates versus rack travel."""
 _TRAVEL_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, -1.0])
 _RACK_SIGNS: Final = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
 """Signs from the file to the left wheel's joints, where camber and toe-in are negative rotations."""
@@ -73,7 +73,7 @@ class AxleCurves:
     """Directions a of additional hardening springs, none or two, five numbers each. A wheel displacement e lengthens
     such a spring by t = a . e, and the spring pushes back with a (s t2 + t3), as a soft bushing along a does."""
     hardening_square: tuple[float, ...] = (0.0, 0.0)
-    """Coefficient s of both. It makes them softer to one side than to the other."""
+    """Coefficient s of both springs. It makes them softer to one side than to the other."""
     damping_ratio: Annotated[float, Range(0.0, 0.5)] = 0.2
     """Damping ratio of each mode of the wheel on the elastic part. Rubber and joints of the compact have 0.1 to 0.35.
     """
@@ -154,9 +154,9 @@ class Curves:
     """Curve axles of a car."""
 
     front: AxleCurves | None = None
-    """The front axle; default the links of the model."""
+    """Curves of the front axle; default the links of the model."""
     rear: AxleCurves | None = None
-    """The rear axle; default the links of the model."""
+    """Curves of the rear axle; default the links of the model."""
 
     def __post_init__(self) -> None:
         """Check that the rack steers in front."""
@@ -174,7 +174,7 @@ JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
 """Joints of a curve axle's knuckle in the order of the model. The wheel's steer angle and inclination are exactly `toe`
 and `camber`, since the joints turn about z first, then about x, then about y."""
 HOLDING_TENDON: Final = "_guide"
-"""Suffix of the tendons that hold such a wheel: CORNER_NUMBER_guide."""
+"""Suffix of the tendons that hold a wheel of a curve axle: CORNER_NUMBER_guide."""
 _HELD: Final = 0.05
 """Square of natural frequency times step above which a tendon of the engine holds a mode: 36 Hz at 1 ms. Each tendon
 costs time. Below it the explicit native forces are stable and as accurate."""
@@ -403,7 +403,7 @@ def _row(matrix, start, e0, e1, e2, e3, e4):
 
 @inlined
 def _hardened(record, spring, e0, e1, e2, e3, e4):
-    """Return the force of a hardening spring over its direction a (see `AxleCurves.hardening`)."""
+    """Return the force of a hardening spring per component of its direction a (see `AxleCurves.hardening`)."""
     t = _row(record.hardening, 5 * spring, e0, e1, e2, e3, e4)
     return t * t * (record.square[spring] + t)
 

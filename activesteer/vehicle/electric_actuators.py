@@ -163,7 +163,7 @@ class Motors:
 
 
 AXLES: Final = {"front": CORNERS[:2], "rear": CORNERS[2:]}
-"""Axle -> its wheels, left before right."""
+"""Wheels of each axle, left before right."""
 PLACES: Final = tuple(item.name for item in fields(Motors))
 """Places that a motor can have."""
 
@@ -173,9 +173,9 @@ class Battery:
     """Battery of the motors, with the limits of its power at the terminals."""
 
     discharge_power_W: _Positive | None = None
-    """Largest power that it gives [W]. Default no limit."""
+    """Largest power that the battery gives [W]. Default: no limit."""
     charge_power_W: _NotNegative | None = None
-    """Largest power that it takes from regeneration [W]. Default no limit."""
+    """Largest power that the battery takes from regeneration [W]. Default: no limit."""
     auxiliary_power_W: _NotNegative = 0.0
     """Power of all consumers except the motors [W]."""
 
@@ -184,11 +184,11 @@ MOTOR: Final = numbers_type(
     "left", "right", "gear", "points", "power_W", "regeneration", "efficiency", "idle_W", "follow", "step_Nm",
     "split_Nm", "scale", "offset", "stuck", ("speed_radps", MAX_MAP_POINTS), ("torque_Nm", MAX_MAP_POINTS),
 )  # fmt: skip
-"""A motor. Torques are those at its wheels together, except for its map (shaft). `left` and `right` are its wheels, the
-same one for the motor of a wheel. `follow` is the fraction of the difference between torque and demand that closes in
+"""A motor. Torques are totals at its wheels, except for its map (shaft). `left` and `right` are its wheels, which are
+the same for the motor of one wheel. `follow` is the fraction of the difference between torque and demand that closes in
 one step, `step_Nm` the largest change in one step. A fault sets `scale`, `offset` and `stuck`."""
 HEALTHY: Final = {"scale": 1.0, "offset": 0.0, "stuck": 0.0}
-"""Fields of a motor without a fault."""
+"""Values of a motor's fields without a fault."""
 
 BATTERY: Final = numbers_type("discharge_W", "charge_W", "auxiliary_W")
 """Limits of the battery."""
@@ -253,7 +253,7 @@ class ElectricDrive(NamedTuple):
 
 
 STOP_BEYOND: Final = 1.03
-"""Position of the end stops over the travel at the limit: an assumption."""
+"""Position of the end stops divided by the travel at the limit: an assumption."""
 
 
 @dataclass(frozen=True)
@@ -271,20 +271,20 @@ class ElectricActuator:
     friction_torque_Nm: Annotated[float, Range(0.0, 10.0)] | None = None
     """Dry friction at the motor without load: bearings, seals, brush [N m]."""
     load_friction: Annotated[float, Range(0.0, 20.0)] | None = None
-    """Friction over the load's torque at the motor. For a thread: tan(friction angle) / tan(lead angle). At 1 and more
+    """Friction per torque of the load at the motor. For a thread: tan(friction angle) / tan(lead angle). At 1 and more
     it is self-locking."""
     rotor_inertia_kgm2: Annotated[float, Range(1e-7, 1e-2)] | None = None
     """Inertia of everything that turns with the motor [kg m2]."""
     peak_torque_Nm: _Positive | None = None
     """Highest torque of the motor, by its current limit [N m]."""
     stall_torque_Nm: _Positive | None = None
-    """Torque at rest without that limit, at nominal voltage [N m]."""
+    """Torque at rest without the current limit, at nominal voltage [N m]."""
     no_load_speed_radps: _Positive | None = None
     """Speed at which no torque is left, at nominal voltage [rad/s]."""
     speed_limit_radps: _Positive | None = None
-    """Highest speed demand of its controller [rad/s]."""
+    """Highest speed demand of the motor's controller [rad/s]."""
     nominal_voltage_V: _Positive | None = None
-    """Voltage of these values [V]."""
+    """Voltage at which these values hold [V]."""
     supply_voltage_V: Annotated[float, Range(0.0, 1000.0)] | None = None
     """Supply voltage; 0: unpowered [V]."""
     supply_power_W: Annotated[float, Range(0.0, 1e5)] | None = None
@@ -379,7 +379,7 @@ class RearActuator(ElectricActuator):
     lead_m: Annotated[float, Range(1e-4, 0.05)] | None = None
     """Travel per turn of the screw [m]."""
     screw_stiffness_Npm: Annotated[float, Range(1e5, 1e10)] | None = None
-    """Nut, thread, bearing and housing, in series with the link [N/m]."""
+    """Stiffness of nut, thread, bearing and housing, in series with the link [N/m]."""
     backlash_m: Annotated[float, Range(0.0, 5e-3)] | None = None
     """Free play between link and screw, from end to end [m]."""
     position_tolerance_m: Annotated[float, Range(0.0, 1e-3)] | None = None

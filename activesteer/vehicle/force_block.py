@@ -171,13 +171,13 @@ def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
 
 BLOCK_NAME: Final = "activesteer"
 MARKER: Final = 20121121.0
-"""Last number of the block. The date of the conference of the paper that this project starts from."""
+"""Last number of the block: the date of the conference of the paper that this project starts from."""
 TRAILER_SIZE: Final = 2
 MAX_CHAIN: Final = 32
 """Largest number of degrees of freedom between the world and a wheel."""
 MAX_CURVE_POINTS: Final = 12
 POWERS: Final = 5
-"""Coefficients of a polynomial without a constant term."""
+"""Number of coefficients of a polynomial without a constant term."""
 
 WHEEL: Final = numbers_type(
     "body", "root", "act_x", "act_y", "act_z", "mu", "pressure_Pa", "low_speed_mps", "low_speed_damping_Nspm",

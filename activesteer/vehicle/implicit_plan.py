@@ -103,7 +103,7 @@ ARRAYS: Final = (
     "actuator_gaintype", "actuator_biastype", "actuator_outnum", "actuator_trntype", "actuator_trnid",
     "actuator_damping", "actuator_dampingpoly", "sensor_type", "sensor_needstage", "sensor_objid",
 )  # fmt: skip
-"""Arrays of the model that do so, but for the sizes and the tree of joints, which cannot change."""
+"""Arrays of the model that decide this, except the sizes and the tree of joints, which cannot change."""
 
 
 def servos(model: mujoco.MjModel) -> NDArray[np.intp]:

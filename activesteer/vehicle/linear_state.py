@@ -32,7 +32,7 @@ from activesteer.vehicle.statics import turn_chassis_back
 
 _AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 _JOINT_DOFS: Final = {0: _AXES, 1: ("_x", "_y", "_z"), 2: ("",), 3: ("",)}
-"""MuJoCo's kind of joint (free, ball, slide, hinge) -> suffixes of the joint's name, one for each of its dofs."""
+"""Suffixes of a joint's name, one for each degree of freedom, by MuJoCo's kind of joint (free, ball, slide, hinge)."""
 
 
 _WIND_UP: Final = ("_brake", "rack_friction")

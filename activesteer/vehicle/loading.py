@@ -114,7 +114,7 @@ SLIP_RATES: Final = {
     "slip_y": "deflection_y_rate_mps",
     "slip_z": "deflection_z_rate_radps",
 }
-"""Relaxation state of a tyre, by the suffix of its actuator -> the output that holds its rate."""
+"""Output that holds the rate of each relaxation state of a tyre, by the suffix of its actuator."""
 
 
 _compiled: deque[tuple[tuple[Any, ...], mujoco.MjModel]] = deque(maxlen=4)

@@ -15,15 +15,15 @@ from activesteer.native.shared_laws import shared
 from activesteer.vehicle import force_block as fb
 
 IDLE, LISTENS, ACTS = range(3)
-"""States of a fault: nothing to do. It keeps what it will need. It acts."""
+"""States of a fault: idle, storing the numbers that it will need, active."""
 WORKS, STUCK, RUNAWAY, RUNAWAY_RIGHT, FLOAT, REVERSED, DROPOUT, OFFSET, DELAYED, DEMAND = range(10)
-"""Kinds of a fault. An exported car takes those up to `DROPOUT`. `RUNAWAY` is to the left, or to the strength of a
-brake; `DEMAND` is the part of an actuator's fault that acts in every step."""
+"""Kinds of a fault. An exported car accepts the kinds up to `DROPOUT`. `RUNAWAY` is to the left, or to the strength of
+a brake; `DEMAND` is the part of an actuator's fault that acts in every step."""
 KINDS: Final = {
     "stuck": STUCK, "runaway": RUNAWAY, "float": FLOAT, "offset": OFFSET, "reversed": REVERSED, "delayed": DELAYED,
     "dropout": DROPOUT,
 }  # fmt: skip
-"""Kind of a fault in files -> its number."""
+"""Numbers of the kinds of fault in files."""
 FAULT: Final = numbers_type("amount", words=("state", "kind", "place", "offset", "memory", "capacity"))
 """A fault. `place` is the address of the demand, or the place of the reading among the outputs of the sensors. `offset`
 the address that a late demand is written to. `memory` the address of the count of kept numbers, the place of the next

@@ -46,8 +46,8 @@ _obstacles_at: Final = records_at(OBSTACLE)
 _cams_at: Final = records_at(CAM)
 _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
 _LEAST_STRETCH: Final = 0.1
-"""Distance along the middle of a road per distance beside it is at most the inverse; for places near the centre of a
-curve."""
+"""Inverse of the largest ratio of a distance along the middle of a road to the distance beside it. It applies near the
+centre of a curve."""
 
 
 @inlined

@@ -37,7 +37,7 @@ from activesteer.vehicle.step_bindings import (
 )
 
 FASTEST_MPS: Final = 200.0
-"""No car of this package drives faster. A run with a higher speed, or a speed that is NaN, has diverged [m/s]."""
+"""Speed above which a run has diverged, as with a speed that is NaN [m/s]. No car of this package drives faster."""
 
 _N_WHEELS: Final = len(CORNERS)
 _N_MEASURED: Final = len(MEASURED)

@@ -49,7 +49,7 @@ _MASS_HINTS: Final = {
     **dict.fromkeys(("load_kg", "payload", "passengers", "luggage_kg"), _MASS_HINT),
     **dict.fromkeys(("cg_m", "cg_height", "cg_height_m"), _GRAVITY_HINT),
 }
-"""Keys that do not exist but that users may expect -> the keys that have this effect."""
+"""Keys to use instead of keys that users may expect but that do not exist."""
 Position = Annotated[tuple[float, ...], Range(-20.0, 20.0)]
 
 
@@ -68,8 +68,8 @@ class TyreFitment:
     low_speed_mps: Annotated[float, Range(0.1, 5.0)] = 2.0
     """Speed below which the standstill terms fade in [m/s]: there relaxation takes longer than a body oscillation."""
     low_speed_damping_Nspm: NotNegative = 1500.0
-    """Viscous coefficient of the contact patch at rest [N s/m]: a third of critical for a wheel of 1 kg m2 that
-    oscillates on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
+    """Viscous coefficient of the contact patch at rest [N s/m]: a third of the critical damping of a wheel of 1 kg m2
+    that oscillates on a carcass of 450 kN/m, 2 sqrt(k J) / R = 4400 N s/m."""
     conventions: TyreConventions = TyreConventions()
     """Conventions that a tyre file leaves open. Default: the conventions of this package."""
 
@@ -105,17 +105,17 @@ class Friction:
     """Dry friction, independent of speed and elastic until it slips (see `native_actuators`)."""
 
     front_damper_N: NotNegative = 0.0
-    """Seal, piston and rod guide of a front damper or strut, along it [N]."""
+    """Friction of seal, piston and rod guide of a front damper or strut, along it [N]."""
     rear_damper_N: NotNegative = 0.0
-    """The same at the rear [N]."""
+    """The same friction of a rear damper or strut [N]."""
     rack_N: NotNegative = 0.0
-    """Rack in its guide and seals, pinion, assist motor, along the rack [N]."""
+    """Friction of the rack in its guide and seals, of pinion and assist motor, along the rack [N]."""
     damper_stiffness_Npm: Annotated[float, Range(1.0, 1e6)] = 1e5
     """Force over travel before a damper slips [N/m]: a seal's lip deflects by some tenths of a millimetre."""
     vibration_mps: Annotated[float, Range(0.0, 1.0)] = 0.0
     """RMS of the damper speed that a road's roughness causes at 80 km/h [m/s]. It grows with the root of the speed."""
     rack_stiffness_Npm: Annotated[float, Range(1.0, 1e7)] = 2e6
-    """The same for the rack [N/m]."""
+    """Force over travel before the rack slips [N/m]."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class Aerodynamics:
     drag_area_m2: NotNegative
     """Drag coefficient times frontal area [m2]."""
     air_density_kgpm3: NotNegative = 1.2
-    """At 20 deg C and sea level [kg/m3]."""
+    """Density of the air [kg/m3]. The default is for 20 deg C and sea level."""
     pressure_point_m: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Point where drag acts, vehicle axes [m]."""
 
@@ -181,13 +181,13 @@ class Load:
     payload_kg: Annotated[float, Range(0.0, 2000.0)] = 0.0
     """Persons and luggage in addition to the driver [kg]."""
     payload_position_m: Position | None = None
-    """Their centre of gravity, vehicle axes [m]; default above the middle of the rear axle, 0.6 m high."""
+    """Centre of gravity of the payload, vehicle axes [m]; default above the middle of the rear axle, 0.6 m high."""
     payload_forward_change_m: Annotated[float, Range(-2.0, 4.0)] = 0.0
     """Forward shift of that position [m]. Unlike the position, it places the payload alike in cars of any wheelbase."""
     roof_kg: Annotated[float, Range(0.0, 500.0)] = 0.0
     """Load on the roof [kg], over the middle of the wheelbase."""
     roof_height_m: Annotated[float, Range(0.5, 4.0)] = 1.6
-    """Height of its centre of gravity above the road [m]."""
+    """Height of the roof load's centre of gravity above the road [m]."""
     fuel_kg: Annotated[float, Range(-100.0, 200.0)] = 0.0
     """Fuel in addition to the fuel in the model [kg]. Negative is less."""
     fuel_position_m: Position | None = None
@@ -195,7 +195,7 @@ class Load:
     cg_height_change_m: Annotated[float, Range(-0.3, 0.3)] = 0.0
     """Upward shift of the empty car's centre of gravity [m], by moving the chassis's centre of gravity."""
     cg_forward_change_m: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    """Forward shift of it [m]."""
+    """Forward shift of the empty car's centre of gravity [m]."""
 
     def __post_init__(self) -> None:
         """Check that each position has three numbers."""
@@ -357,8 +357,8 @@ CLUTCH_OPEN: Final = 0
 _FADE: Final = 0.02
 """Fraction of the speed limit over which the torque fades to zero."""
 _CLUTCH_SLIPS_radps: Final = 6.0
-"""Speed of the wheels below which the clutch slips, and the drag of the engine falls with the speed [rad/s]: that of
-idling at 800 1/min in first gear."""
+"""Speed of the wheels below which the clutch slips, and the drag of the engine falls with the speed [rad/s]: the speed
+of idling at 800 1/min in first gear."""
 
 
 @compiled

@@ -41,14 +41,14 @@ _INPUTS: Final = {
     "steering_wheel": "steering_wheel", "superposition": "superposition", "rear_left": "rl_steer",
     "rear_right": "rr_steer",
 }  # fmt: skip
-"""Name of an actuator in the step -> its name in the model."""
+"""Name in the model of each actuator of the step."""
 _SENSORS: Final = {
     "velocimeter": "cg_velocimeter", "accelerometer": "cg_accelerometer",
     "steering_wheel_angle": "steering_wheel_angle", "superposition_angle": "superposition_angle",
     "rear_left_angle": "rl_steer_angle", "rear_right_angle": "rr_steer_angle", "wheel_speed": "fl_wheel_speed",
     "position": "cg_position", "velocity": "cg_velocity", "orientation": "chassis_orientation",
 }  # fmt: skip
-"""Name of a sensor in the step -> its name in the model; bound by its first place in `sensordata`."""
+"""Name in the model of each sensor of the step, bound by its first place in `sensordata`."""
 _ADDRESSES: Final = (
     "implicit", "time", "warnings", "qvel", "n_dofs", "ctrl", "sensordata", "positions", "quaternions",
     "n_bodies", "brake_setup", "brake_state", "tape", "n_motors", "motors", "battery", "electric_state", "gear",
@@ -148,7 +148,7 @@ def read_through(bindings: NDArray[Any], sensors: SensorBlock | None) -> None:
 
 
 def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
-    """Numbers of a row, in the order of `write_commands`."""
+    """Return the numbers of a row, in the order of `write_commands`."""
     count = Counter(field for message in messages.values() for field in message._fields)
     return {
         f"{sender}_{number.name}" if count[number.field] > 1 else number.name: number
@@ -158,7 +158,7 @@ def command_numbers(messages: Mapping[str, type[Any]]) -> dict[str, Number]:
 
 
 def command_channels(numbers: Mapping[str, Number]) -> dict[Channel, int]:
-    """Indices of the recorded numbers in a row, by channel."""
+    """Return the indices of the recorded numbers in a row, by channel."""
     return {
         Channel(name, number.recorded.unit, number.recorded.meaning, "control"): place
         for place, (name, number) in enumerate(numbers.items())
@@ -172,7 +172,7 @@ COMMANDS: Final = tuple(_NUMBERS)
 COMMAND_ROW: Final = np.dtype([(name, np.float64) for name in COMMANDS])
 """A row as compiled code reads it."""
 COMMAND_CHANNELS: Final = command_channels(_NUMBERS)
-"""Channel -> its place in a row."""
+"""Place of each channel in a row."""
 CARRIED_OUT: Final = tuple(name for name, number in _NUMBERS.items() if number.recorded is None or number.recorded.acts)
 """Names of the numbers that the car acts on. The others are for the recording only."""
 BRAKES: Final = COMMANDS.index("fl_brake_torque_demand_Nm")
@@ -186,7 +186,7 @@ ESTIMATE_CHANNELS: Final = tuple(
 )
 """Channels of the fields of an `Estimate`, in their order."""
 write_estimate: Final = struct.Struct(f"{len(Estimate._fields)}d").pack_into
-"""`write_estimate(row, 0, *estimate)` writes a row into the memory of an array. The arguments must be numbers."""
+"""Write a row into the memory of an array: `write_estimate(row, 0, *estimate)`. The arguments must be numbers."""
 _SIZE_DRIVER: Final = 8 * len(numbers_of(DriverCommand))
 """Bytes of a row that hold the driver's command."""
 
@@ -226,7 +226,7 @@ def write_commands(row: Array, driver_command: Any, actuator_command: Any) -> No
 
 
 def engine_arrays(data: mujoco.MjData) -> dict[str, Array]:
-    """Arrays of the engine, under the names of `RawRows`."""
+    """Return the arrays of the engine, under the names of `RawRows`."""
     return {name: getattr(data, name) for name in ENGINE_ARRAYS}
 
 
@@ -273,7 +273,7 @@ class RecordedArrays:
 
 
 _CALIBRATED_AT_MPS: Final = 20.0
-"""Speed at which the rolling radii are taken that turn wheel speeds into the speed of the car [m/s]."""
+"""Speed for the rolling radii that convert wheel speeds to the speed of the car [m/s]."""
 
 
 class WheelSet:

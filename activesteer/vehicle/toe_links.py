@@ -37,9 +37,9 @@ _POINTS: Final = 15
 _ITERATIONS: Final = 30
 _TOLERANCE_M: Final = 1e-10
 _BEYOND: Final = 1.05
-"""Range of the solution over the limit."""
+"""Range of the solution, relative to the limit."""
 _FIT: Final = 2e-3
-"""Largest error of the polynomials, over the range."""
+"""Largest error of the polynomials, relative to the range."""
 
 
 class ToeLinkMap(NamedTuple):

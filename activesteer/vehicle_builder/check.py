@@ -38,7 +38,7 @@ _WRAPPED: Final = textwrap.TextWrapper(80, subsequent_indent=11 * " ", break_lon
 
 @dataclass(frozen=True)
 class Finding:
-    """Line of the report.
+    """Result of one check: a line of the report.
 
     Attributes:
         topic: parts, geometry, standing, riding, kinematics, steering, tyres.
@@ -355,7 +355,7 @@ def _reach(points: dict[str, Array]) -> Iterator[Finding]:
 _COUNTS: Final = {
     "body": "nbody", "joint": "njnt", "site": "nsite", "tendon": "ntendon", "actuator": "nu", "sensor": "nsensor",
 }  # fmt: skip
-"""Kind of a part -> the model's number of them."""
+"""Name of the model's count of each kind of part."""
 
 
 def _each(*parts: str) -> tuple[str, ...]:

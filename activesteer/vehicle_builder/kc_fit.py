@@ -30,8 +30,8 @@ _FLOOR: Final = np.diag([4e-9, 4e-9, 1e-7, 1e-7, 1e-7])
 _WHEEL: Final = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 """Inertia of a wheel with hub and knuckle [kg, kg m2]."""
 _FASTEST: Final = (2.0 * np.pi * 320.0) ** 2
-"""Square of the highest natural frequency of a wheel [1/s2]. Higher ones show nothing at a step of 1 ms, and cost
-iterations."""
+"""Square of the highest natural frequency of a wheel [1/s2]. Higher frequencies have no visible effect at a step of 1
+ms, and cost iterations."""
 _UNITS: Final = np.sqrt(np.outer(np.diag(_USUAL), np.diag(_USUAL)))
 _LOWER: Final = np.tril_indices(5)
 _LINEAR: Final = 15

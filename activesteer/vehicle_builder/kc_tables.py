@@ -47,7 +47,7 @@ _GREATEST: Final = {
 _LEAST_SPAN: Final = {"travel": 0.01, "rack": 0.005, "force": 10.0, "moment": 1.0}
 """Smallest range of a variable that shows the behaviour of an axle, SI units."""
 _GREATEST_WAY_M: Final = 10.0
-"""Such a value for all other channels, which may have any origin [m]."""
+"""Value that no car reaches in any other channel, which may have any origin [m]."""
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
 
 
 _NEAR: Final = {"travel": 0.02, "rack": 0.02, "force": 1500.0, "moment": 100.0}
-"""Variable -> range about zero within which a slope counts [m, N, N m]."""
+"""Range about zero within which a slope counts, by variable [m, N, N m]."""
 _HINT: Final = f" ({NAMES_FILE} turns the sign of a channel)"
 _UNITS: Final = {"deg/m": np.degrees(1.0), "mm/m": 1e3, "deg/kN": np.degrees(1e3)}
 _CHECKS: Final = read_toml(Path(__file__).with_name("kc_checks.toml"))[0]

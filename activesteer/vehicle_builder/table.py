@@ -36,7 +36,7 @@ class LinkTable:
     """Keys of a link, with one of `stiffness_Npm`, `bushings_Npm` and `bushing`."""
 
     stiffness_Npm: Positive | None = None
-    """Rod and both bushings in series [N/m]."""
+    """Stiffness of rod and both bushings in series [N/m]."""
     bushings_Npm: tuple[float, ...] | None = None
     """Radial stiffness of inner and outer bushing [N/m]. The rod between them counts as rigid."""
     bushing: str | None = None
@@ -138,7 +138,7 @@ class AxleTable:
     strut_inertia_kgm2: tuple[float, ...] | None = None
     """Inertia of the strut [kg m2]."""
     top_mount: TopMountTable | None = None
-    """Elasticity of the top mount. Default: a strut's as the compact's, a damper's rigid."""
+    """Elasticity of the top mount. Default: as in the compact for a strut, rigid for a damper."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class SteeringTable:
     rack_friction_N: NotNegative | None = None
     """Dry friction of the rack [N]."""
     column_stiffness_Npm: Positive | None = None
-    """Torsion bar and assist, at the rack [N/m]."""
+    """Stiffness of torsion bar and assist, at the rack [N/m]."""
 
 
 @dataclass(frozen=True)
@@ -188,9 +188,9 @@ class RearSteeringTable:
     axis_upper: Point | None = None
     """A higher point of the axis."""
     limit_rad: Annotated[float, Range(1e-3, 0.3)] | None = None
-    """Mechanical stop [rad]."""
+    """Angle of the mechanical stop [rad]."""
     stiffness_Nmprad: Annotated[float, Range(1e4, 1e8)] | None = None
-    """Screw, housing and carrier bushings about the axis [N m/rad]."""
+    """Stiffness of screw, housing and carrier bushings about the axis [N m/rad]."""
 
 
 @dataclass(frozen=True)
@@ -319,7 +319,7 @@ _PLAUSIBLE: Final = {
     "rack_limit_m": (0.02, 0.15, 1e-3, "mm"),
     "pinion_radius_m": (0.003, 0.3, 1e-3, "mm"),
 }
-"""Key -> lowest and highest value of a road car, and a unit that users may have used by mistake, with its factor."""
+"""Lowest and highest value of a road car by key, and a unit that users may have used by mistake, with its factor."""
 
 
 _ONE_OF: Final = (

@@ -160,7 +160,7 @@ def _environment() -> Environment:
 
 
 def filled(template: str, **values: Any) -> str:
-    """Fill in a template."""
+    """Return a template with its values filled in."""
     return _environment().get_template(template).render(values)
 
 

@@ -76,7 +76,7 @@ class Trimmed:
 
 
 NEAR_ENOUGH: Final = 5e-6
-"""Smallest correction of a curve [m, rad]; 50 times as much for caster, which moves no contact point."""
+"""Correction of a curve below which the search ends [m, rad]; 50 times as much for caster, which moves no contact."""
 _CASTER: Final = 0.02
 
 

@@ -32,12 +32,12 @@ from activesteer.video.track import Markings, Traces, Track
 CUTAWAY: Final = 0.12
 """Opacity of a shell that lets the suspension be seen."""
 _SHELL_OPACITY: Final = {"chase": 1.0, "top": 0.25, "wheel": CUTAWAY}
-"""Camera -> opacity of the shell of a car."""
+"""Opacity of the shell of a car, by camera."""
 _NEAR_M, _MOST_ASIDE_M, _BACK_PER_ASIDE = 1.5, 25.0, 2.2
 """Half distance of cars up to which the camera stays with the first one [m], largest distance that its target moves
-away from that car [m], and distance that the camera moves back for each metre of it."""
+away from that car [m], and distance that the camera moves back for each metre of this."""
 _SIDE_LIMIT: Final = 8192
-"""Most pixels of a side of a film."""
+"""Largest number of pixels of a side of a film."""
 
 
 def aim(camera: mujoco.MjvCamera, name: str, tracks: Sequence[Track], time_s: float, corner: str = CORNERS[0]) -> None:
@@ -70,7 +70,7 @@ class Settings:
     """Settings of a film, such as camera, size and frame rate."""
 
     camera: str = "chase"
-    """`chase`, `top` or `wheel`."""
+    """Camera: `chase`, `top` or `wheel`."""
     corner: str = CORNERS[0]
     """Wheel in the view of the camera `wheel`."""
     size: tuple[int, int] = (1280, 720)
@@ -80,11 +80,11 @@ class Settings:
     speed: float = 1.0
     """Simulated seconds per second of film."""
     layout: str = "overlay"
-    """`overlay` or `side-by-side`."""
+    """Layout of several cars: `overlay` or `side-by-side`."""
     gauges: str = "full"
-    """`full`, or `sideslip` for one large number for each car and no markings."""
+    """Gauges: `full`, or `sideslip` for one large number for each car and no markings."""
     cutaway: bool = False
-    """Whether the shells of the cars are transparent. The camera `wheel` always shows them so."""
+    """True if the shells of the cars are transparent. The camera `wheel` always shows them so."""
 
     def __post_init__(self) -> None:
         """Check that the settings can be drawn."""

@@ -36,8 +36,8 @@ TOGETHER: Final = "together"
 """Name in place of a system's name, for values of several runs together."""
 MEAN_S: Final = 0.2
 """Time over which an angle is averaged [s]. A car begins to respond in this time: the compact's lateral acceleration is
-at 90 % of its steady state 0.24 s after a step of the steering wheel. The noise of a production yaw rate sensor, 0.1
-deg/s in samples of 10 ms, times the largest gain of the paper's controllers, 0.42 s, is 0.04 deg rms at one time and
+at 90 % of its steady state 0.24 s after a step of the steering wheel. The noise of a production yaw rate sensor is 0.1
+deg/s in samples of 10 ms. Times the largest gain of the paper's controllers, 0.42 s, it is 0.04 deg rms at one time and
 0.01 deg in this mean."""
 AHEAD_RAD: Final = math.radians(1.0)
 """Steering wheel angle that ends the straight-ahead part when it is first exceeded [rad]."""

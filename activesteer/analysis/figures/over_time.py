@@ -95,7 +95,7 @@ def draw_panel(axis: Axes, curve: DrawnRun, panel: Panel, label: str = "", width
 
 
 def friction_label(low: float, high: float) -> str:
-    """Return the label of areas with a different friction, which the legend of the axis leaves out."""
+    """Return the label of areas with a different friction. The legend of the axis leaves it out."""
     return f"_friction {low:.2g}" + (f" to {high:.2g}" if f"{low:.2g}" != f"{high:.2g}" else "")
 
 
@@ -171,7 +171,7 @@ _SAME_BORDER: Final = 0.002
 _AFTER_MARK: Final = 0.12
 """Time shown after the last time of a criterion, as a fraction of the time before it."""
 _LETTER_IN: Final = 0.066
-"""Mean width of a letter of 8 pt, with some room [in]."""
+"""Mean width of a letter of 8 pt, with some margin [in]."""
 _SIDES_IN: Final = 0.6
 """Width of the labels next to the axes [in]."""
 _BEFORE: Final = 0.08

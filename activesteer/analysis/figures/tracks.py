@@ -78,7 +78,7 @@ def overview(recordings: Mapping[str, RecordingLike]) -> Figure:
 
 
 def _draw_tracks(axis: Axes, drawn: Sequence[DrawnRun], course: Course) -> None:
-    """Draw the course, and the track of the front axle centre of every run."""
+    """Draw the course, and the track of every run's front axle centre."""
     for curve in drawn:
         x, y = (over_time.thinned(values) for values in lanes.front_axle(curve.recording))
         axis.plot(

@@ -28,7 +28,7 @@ MAX_SAMPLES: Final = 4000
 MAX_STEP_S: Final = 0.02
 """Longest interval between samples that still represent the signal [s]: they show up to 25 Hz."""
 OFF_COURSE_M: Final = 6.0
-"""Distance from the course up to which the plot shows a car that leaves it while another one stays [m]."""
+"""Distance from the course up to which the plot shows a car that leaves it while another car stays on it [m]."""
 BESIDE_M: Final = 60.0
 """Distance from the tracks up to which areas of a different friction and obstacles are drawn [m]."""
 DIGITS: Final = 4

@@ -71,7 +71,7 @@ _LICENSES: Final = (
 
 
 class Export(NamedTuple):
-    """An exported car."""
+    """Exported car: its variables, its compiled library, and the library of the engine."""
 
     name: str  # of the vehicle
     variables: list[Variable]  # its variables; the value reference is the place

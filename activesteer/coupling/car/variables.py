@@ -42,8 +42,7 @@ PLACE_GROUPS: Final = (
 )  # fmt: skip
 """Sensors of the engine that these channels are computed from."""
 PLACES: Final = [name for names in PLACE_GROUPS for name in names]
-"""Names of these sensors, in the order in which car.c keeps their places. For a position, the place is the place of its
-height."""
+"""Names of these sensors in the order of their places in car.c. The place of a position is the place of its height."""
 
 
 class Variable(NamedTuple):

@@ -320,7 +320,7 @@ def _bushes_Npmm(axle: Axle) -> Array:
 
 
 def _top_mount_Npmm(axle: Axle, direction: str) -> float:
-    """Stiffness of the left top mount, or nan for a rigid one [N/mm]."""
+    """Stiffness of the left top mount, or nan for a rigid mount [N/mm]."""
     model = axle.measured.vehicle.model
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, f"{axle.name[0]}l_mount_{direction}")
     return 1e-3 * float(model.tendon_stiffness[tendon]) if tendon >= 0 else math.nan
@@ -387,8 +387,7 @@ FORMULAS: Final[dict[str, Callable[[Axle], float]]] = {
     "braking_pitch_gradient": lambda axle: _per_g(axle.measured.modes.pitch_gradient_radps2pm),
     "damper_asymmetry": _damper_asymmetry,
 }
-"""Functions from an axle to a value, by characteristic of metrics.toml. Other characteristics are slopes, axes or
-modes."""
+"""Functions from an axle to a value, by characteristic of metrics.toml. All others are slopes, axes or modes."""
 
 
 @dataclass(frozen=True)

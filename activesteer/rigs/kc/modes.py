@@ -59,7 +59,7 @@ _LIFT_M: Final = 1.0
 _DIFFERENCE: Final = 1e-6
 """Step of the central differences [m, rad, and per second]."""
 _FASTEST_HZ: Final = 40.0
-"""Highest frequency of the modes of body and wheels. Links and steering have higher ones [Hz]."""
+"""Highest frequency of the modes of body and wheels. Links and steering have higher frequencies [Hz]."""
 NAMES: Final = (
     "body_bounce",
     "body_pitch",

@@ -145,7 +145,7 @@ CHANNELS: Final = {
     "centre_forward": ("m", "mm"), "centre_outwards": ("m", "mm"), "contact_forward": ("m", "mm"),
     "contact_outwards": ("m", "mm"), "load": ("N", "N"), "damper": ("m", "mm"),
 }  # fmt: skip
-"""Channel -> its SI unit and its unit in a file. Channels of a wheel begin with left_ or right_."""
+"""SI unit and unit in a file of each channel. Channels of a wheel begin with left_ or right_."""
 OF_THE_AXLE: Final = ("rack", "force", "moment", "steering_wheel")
 """Channels of the axle, not of a wheel."""
 

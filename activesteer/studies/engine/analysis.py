@@ -100,7 +100,7 @@ def _computed(
 
 
 MAX_ROWS: Final = 20_000
-"""Most rows to compare."""
+"""Largest number of rows to compare."""
 
 Place = tuple[int, int, int]
 """Numbers of manoeuvre, vehicle and controller."""

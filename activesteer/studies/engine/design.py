@@ -33,7 +33,7 @@ class DesignTable:
     samples: Annotated[int, Range(1, MAX_SAMPLES)] = 0
     """Size of the sample. For `saltelli` the base sample (D + 2 runs each), for `morris` trajectories (D + 1 each)."""
     paired: bool = True
-    """Whether all controllers are driven with the same sample."""
+    """True if all controllers are driven with the same sample."""
     maneuvers: Literal["all", "one"] = "all"
     """`all`: every sample drives every manoeuvre. `one`: every sample drives one of them, drawn at random, all equally
     often."""

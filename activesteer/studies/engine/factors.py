@@ -17,7 +17,7 @@ from activesteer.errors import shown
 KINDS: Final = ("grid", "choice", "uniform", "log_uniform", "normal")
 """Kinds of factors. A factor's table has exactly one of these keys."""
 _OPTIONS: Final = {"weights": "choice", "truncate": "normal"}
-"""Option -> the kind that it belongs to."""
+"""Kind that each option belongs to."""
 _ANYWHERE: Final = ("nominal", "of", "grows_with", "maneuvers", "when")
 """Keys that every kind allows."""
 _DEFAULT_TRUNCATION: Final = 3.0

@@ -31,7 +31,7 @@ from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 
 _SHOWN_ROWS: Final = 3000
-"""Most runs whose points the page holds. Counts and means are over all runs."""
+"""Largest number of runs whose points the page holds. Counts and means are over all runs."""
 _FEW: Final = 20
 """Runs of a controller below which quantiles, ranks and shares say little: the page shows each run instead."""
 _BINS: Final = 40
@@ -39,7 +39,7 @@ _EXTREMES: Final = 5
 _FIRST: Final = (*SIDESLIP_PEAKS, "yaw_rate_peak_radps", "ay_peak_mps2")
 """Metrics that a page shows first."""
 _MAX_INDICES: Final = 400
-"""Most sets of indices. Each takes some hundredths of a second."""
+"""Largest number of sets of indices. Each takes some hundredths of a second."""
 
 Places = NDArray[np.int64]
 
@@ -329,7 +329,7 @@ def _json(column: Array) -> list[float | None]:
 
 
 _FACTORS: Final = 5
-"""Most factors that a page does not fold, or that are drawn: those with which the margin correlates most."""
+"""Largest number of factors that a page shows unfolded, or draws: those with which the margin correlates most."""
 _KEPT, _BROKEN, _GREY = "#5b9fd0", "#b3261e", "0.6"
 
 

@@ -46,13 +46,13 @@ class TuneTable:
     """The table [tune] of a study file."""
 
     minimise: dict[str, str] = field(default_factory=dict)
-    """Name -> expression to be minimised. For several, the Pareto front is found."""
+    """Expressions to minimise, by name. For several, the Pareto front is found."""
     satisfy: dict[str, str] = field(default_factory=dict)
-    """Name -> requirement. The search satisfies as many as possible."""
+    """Requirements by name. The search satisfies as many as possible."""
     violate: str = ""
     """Requirement whose worst case is searched. `controller` stands for the examined controller."""
     constraints: dict[str, str] = field(default_factory=dict)
-    """Name -> requirement that the best set must keep."""
+    """Requirements that the best set must meet, by name."""
     seeds: tuple[dict[str, Any], ...] = ()
     """Sets to try first."""
     trials: Annotated[int, Range(1, 10_000_000)] = 100

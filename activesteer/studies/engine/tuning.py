@@ -36,7 +36,7 @@ _STARTUP: Final = 0.2
 _WARM: Final = 10
 """Number of times that a warm start of CMA-ES counts its source: it learns from the best tenth of its sources."""
 Progress = Callable[[str, int, int], None]
-"""Called after every set with the name of the search, its finished sets, and their total."""
+"""Callback after every set, with the name of the search, its finished sets, and their total."""
 
 
 @dataclass(frozen=True)

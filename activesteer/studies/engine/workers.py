@@ -283,9 +283,9 @@ def _processors() -> int:
 
 
 _ATTEMPTS: Final = 3
-"""Number of attempts before a task counts as the one that kills its worker. The last attempt runs alone."""
+"""Number of attempts before a task counts as fatal for its worker. The last attempt runs alone."""
 _engine: Final = threading.RLock()
-"""MuJoCo's callbacks belong to the process, so one thread of a worker does one task at a time."""
+"""Lock of the engine: MuJoCo's callbacks belong to the process, so one thread of a worker does one task at a time."""
 
 
 class WorkerDied(StudyError):  # noqa: N818 - an event, named as one

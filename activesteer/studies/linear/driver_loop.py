@@ -38,7 +38,7 @@ from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_
 from activesteer.theory.single_track import SingleTrack
 
 STEP_M: Final = 0.5
-"""Offset of the path from the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and
+"""Offset of the path from the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear. It
 moves the steering wheel further than the friction of the rack can hide."""
 _CLOSE_M: Final = 0.1 * STEP_M
 """Distance from the path that may remain at the end [m]; the friction of the rack hides some."""
@@ -103,7 +103,7 @@ SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0)
 LEAST_DAMPING: Final = 0.25
 """Smallest damping ratio that is required of a loop."""
 DAMPED_KMH: Final = 80.0, 100.0
-"""Lowest and highest speed at which it is required [km/h]."""
+"""Lowest and highest speed at which this damping is required [km/h]."""
 LEAST_PHASE_MARGIN_DEG: Final = 30.0
 """Least phase margin of humans, as McRuer and Krendel measured it [deg]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.2, 60.0, 300)
@@ -345,7 +345,7 @@ _HEADS: Final = {
     "phase_margin_deg": "phase margin [deg]",
     "crossover_rad_s": "crossover [rad/s]",
 }
-"""Key of a result -> head of its column on a page."""
+"""Heads of the columns on a page, by key of a result."""
 _FROM_RUNS: Final = ("damping_in_step", "damping_in_run")
 
 

@@ -146,7 +146,7 @@ MIN_SPEED_MPS: Final = 3.0
 _SETTLE_S: Final = 1.0
 _NO_INFLUENCE: Final = 1e-8
 """Smallest fraction of a mode in any gain of the car for which the state space contains it. Symmetric modes have 1e-12,
-the least of the lateral ones 1e-4."""
+the smallest of the lateral modes 1e-4."""
 
 
 @dataclass(frozen=True)
@@ -357,9 +357,9 @@ def eigenvalue_table(modes: Sequence[Mode], highest_Hz: float = CUT_OFF_HZ) -> s
 
 
 _LEAST_SHARE: Final = 0.005
-"""Participation below it is left out."""
+"""Participation below which a table leaves a part out."""
 _MODE_COLUMNS: Final = ("mode", "f0 [Hz]", "damping", "eigenvalue [1/s]", "participation")
-"""f0 is the natural frequency."""
+"""Heads of the columns of modes; f0 is the natural frequency."""
 
 
 def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, ...]]:

@@ -173,4 +173,4 @@ COEFFICIENTS: tuple[Coefficient, ...] = _parse(Path(__file__).with_name("coeffic
 """Every numeric key that the package knows, in the order of the table."""
 
 BY_NAME: dict[str, Coefficient] = {coefficient.name: coefficient for coefficient in COEFFICIENTS}
-"""The same records by key."""
+"""Records of `COEFFICIENTS` by key."""

@@ -47,9 +47,9 @@ _SLIDING_TO_LINEAR: Final = 3.0
 _SLIDING_TWIST_RAD: Final = 0.12
 """Twist at which the whole patch slides about its middle [rad]: parking torques level off after about 5 to 8 deg."""
 _NO_TURN_SLIP_1PM: Final = 1e-12
-"""Stands for no turn slip in the formula with turn slip. Zero would select the formula without it."""
+"""Turn slip that stands for zero in the formula with turn slip. Zero would select the formula without it."""
 _SMALLEST_SLIP_LIMIT: Final = 0.01
-"""Smallest slip limit of a deflection, whatever the range of a tyre file."""
+"""Smallest slip limit of a deflection, for any range in a tyre file."""
 _MAX_LOAD_STEPS: Final = 8
 _CAUTIOUS: Final = 0.1
 """Fraction of the load that remains if a step of the search would lift the tyre."""

@@ -221,7 +221,7 @@ def clamp(x: float, low: float, high: float) -> float:
 
 @compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
-    """Return the relative deviation of the pressure from the nominal one."""
+    """Return the relative deviation of the pressure from the nominal pressure."""
     return clamp(pressure_Pa, p.PRESMIN, p.PRESMAX) / p.NOMPRES - 1.0
 
 
@@ -229,7 +229,7 @@ def relative_pressure(p, pressure_Pa: float) -> float:
 def steady_state(
     p, fz: float, kappa: float, alpha: float, gamma: float, pressure: float, vx: float, mu: float, turn_slip: float
 ):
-    """Evaluate the formula once."""
+    """Evaluate the Magic Formula once, in steady state."""
     if not fz > 0.0:
         return SteadyState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     load = clamp(fz, p.FZMIN, p.FZMAX)

@@ -250,7 +250,7 @@ def turn_slip_factors(
 
 
 MIN_RELAXATION_LENGTH_M: Final = 0.02
-"""About the length of a tread block. It keeps the slip defined when the load vanishes."""
+"""Smallest relaxation length [m], about a tread block's length. It keeps the slip defined when the load vanishes."""
 
 
 @compiled

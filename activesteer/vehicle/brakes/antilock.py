@@ -34,10 +34,9 @@ from activesteer.native.compilation import compiled, inlined
 OFF, RELEASE, RECOVER, BUILD, HOLD = 0.0, 1.0, 2.0, 3.0, 4.0
 
 _REGAINS_mps2: Final = 3.0
-"""A wheel that accelerates relative to the car by more than this is recovering; below it, the wheel rolls with the car.
-"""
+"""Acceleration relative to the car above which a wheel is recovering; below it, the wheel rolls with the car."""
 _LOCKED_SLIP: Final = 0.9
-"""Slip beyond which a wheel stands, apart from its swinging on the tyre."""
+"""Slip beyond which a wheel counts as standing, apart from its swinging on the tyre."""
 _PATIENCE_S: Final = 0.03
 """Time in which a released wheel must gain speed before its pressure is lowered further [s]."""
 _TYRE_LAG_M: Final = 0.5
@@ -45,11 +44,11 @@ _TYRE_LAG_M: Final = 0.5
 _SETTLES_S: Final = 0.08
 """Time in which the wheel follows the first pressure of BUILD, while the tyre's carcass winds up [s]."""
 _KEPT: Final = 0.9
-"""Friction torque of a wheel that is released again so soon, as a fraction of the previous one."""
+"""Friction torque of a wheel that is released again within this time, as a fraction of the previous one."""
 _MEAN_S: Final = 0.5
 """Time constant of the mean friction torque of a wheel [s]; a cycle lasts about 0.1 s."""
 _HELD_LESS: Final = 0.95
-"""Held torque after a release, as a fraction of the one before."""
+"""Held torque after a release, as a fraction of the torque held before."""
 _IMPATIENCE_S: Final = 0.25
 """Time in which the rate of BUILD increases by its initial value [s]."""
 
@@ -107,7 +106,7 @@ def _largest_slip(setup, state, wheel, fed_Pa):
 
 @inlined
 def _least_slip(setup, state, wheel, car_mps2):
-    """Minimum slip for a release of a wheel by its deceleration."""
+    """Smallest slip for a release of a wheel by its deceleration."""
     phase = state.phase[wheel]
     minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
     if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:

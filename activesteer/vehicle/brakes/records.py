@@ -46,54 +46,54 @@ class Antilock:
     """Parameters of the anti-lock system (see `antilock`)."""
 
     select_low: bool = True
-    """Whether both rear wheels get the pressure of the wheel with less grip."""
+    """True if both rear wheels get the pressure of the wheel with less grip."""
     hold_speed_mps: Annotated[float, Range(0.5, 20.0)] = 5.0
     """Speed below which pressures are held and only slip releases a wheel [m/s]; a tyre of 0.4 m relaxation length
     then takes more than 0.08 s to build up its force."""
     hold_slip_mps: NotNegative = 0.3
-    """Speed difference added to the largest slip there, by which the estimated speed may be off [m/s]."""
+    """Speed difference added to the largest slip below this speed, by which the estimated speed may be off [m/s]."""
     hold_rise_per_s: NotNegative = 0.03
     """Rate of the held pressure, as a fraction of the last limit per second [1/s]."""
     lowest_speed_mps: Annotated[float, Range(0.1, 10.0)] = 0.5
-    """Speed below which the system hands the brakes over to the driver [m/s] ..."""
+    """Speed below which the system hands the brakes over to the driver [m/s]."""
     hand_over_Paps: NotNegative = 4e6
-    """... by letting the pressures rise at this rate to the driver's demand [Pa/s]."""
+    """Rate at which the pressures then rise to the driver's demand [Pa/s]."""
     first_deceleration_mps2: Positive = 20.0
     """Deceleration of a wheel relative to the car that releases it while the pedal is being pressed [m/s2]. The fastest
     rise of pressure causes 14 m/s2 at 100 km/h by the slip that it needs, without any risk of locking."""
     first_slip: Fraction = 0.08
-    """Least slip for that; below it the pedal or the road causes the deceleration."""
+    """Smallest slip for this release; below it the pedal or the road causes the deceleration."""
     deceleration_mps2: Positive = 6.0
     """Deceleration relative to the car that releases a wheel while pressure builds up slowly [m/s2]."""
     min_slip: Fraction = 0.02
-    """Least slip for that on a road without grip ..."""
+    """Smallest slip for this release on a road without grip."""
     min_slip_gain_s2pm: NotNegative = 0.005
-    """... its rise with the deceleration of the car, as the slip at the peak of friction rises [s2/m] ..."""
+    """Rise of this slip with the deceleration of the car, as the slip at the peak of friction rises [s2/m]."""
     min_slip_speed_mps: NotNegative = 0.1
-    """... and a speed difference added to it, which counts at low speed, where the speed estimate is uncertain [m/s].
-    """
+    """Speed difference added to this slip, which counts at low speed, where the speed estimate is uncertain [m/s]."""
     largest_slip: Annotated[float, Range(0.05, 0.9)] = 0.3
     """Slip relative to the estimated speed that releases a wheel in any case."""
     intervention_slip: Annotated[float, Range(0.05, 0.9)] = 0.5
     """Slip that releases a front wheel which a controller brakes beyond the pedal. A tyre at a large slip angle takes
     brake force only with a large slip, which also turns its force away from the side: both turn the car back."""
     release_fraction: Fraction = 0.9
-    """Pressure of a released wheel, as a fraction of its friction torque ..."""
+    """Pressure of a released wheel, as a fraction of its friction torque."""
     regain_mps2: NotNegative = 10.0
-    """... or less, if that friction would accelerate the wheel by less than this, as on ice [m/s2]."""
+    """Acceleration that a released wheel must reach [m/s2]. If it does not, as on ice, the pressure is reduced
+    further."""
     rolls_fraction: Fraction = 0.5
     """A released wheel rolls with the car again once its acceleration falls below this fraction of its peak [-]."""
     resume_fraction: Fraction = 0.97
     """Pressure of a wheel that rolls again, as a fraction of its friction torque."""
     build_per_s: Positive = 0.5
-    """Initial rate of pressure from there on, as a fraction of it per second [1/s]."""
+    """Initial rate of pressure from then on, as a fraction of the pressure per second [1/s]."""
     side_difference_Pa: NotNegative = 0.5e6
-    """Initial limit by which a front wheel's pressure may exceed that of a released one on the other side [Pa] ..."""
+    """Initial limit by which a front wheel's pressure may exceed a released front wheel's on the other side [Pa]."""
     side_difference_rise_Paps: NotNegative = 4e6
-    """... and the rate at which that limit grows, so that the driver can follow the yaw moment [Pa/s]."""
+    """Rate at which this limit grows, so that the driver can follow the yaw moment [Pa/s]."""
     rear_side_fraction: Fraction = 0.5
-    """Part of the difference that a controller steers against which the rear wheels get too: a rear axle braked to its
-    limit has no lateral force."""
+    """Fraction of the pressure difference allowed by a controller that the rear wheels get too: a rear axle braked to
+    its limit has no lateral force."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class TractionControl:
     slip: Annotated[float, Range(0.005, 0.5)] = 0.05
     """Allowed slip, relative to the speed of the wheels that are not driven."""
     spin_mps: Annotated[float, Range(0.05, 5.0)] = 0.6
-    """Allowed speed difference in addition [m/s]."""
+    """Speed difference that is allowed in addition to this slip [m/s]."""
     engine_gain_Nmspm: NotNegative = 400.0
     """Proportional reduction of the drive torque per excess speed [Nm/(m/s)]."""
     engine_integral_gain_Nmpm: NotNegative = 1500.0
@@ -111,7 +111,7 @@ class TractionControl:
     brake_gain_Paspm: NotNegative = 1.5e6
     """Pressure at a driven wheel per speed above the speed of its axle's other wheel [Pa/(m/s)]."""
     brake_limit_Pa: NotNegative = 6e6
-    """Highest pressure of that kind [Pa]."""
+    """Highest pressure that traction control applies [Pa]."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Brakes:
     front_torque_Nm: NotNegative
     """Torque of a front wheel at full pedal; divided by the pressure there, it is the torque per pressure [N m]."""
     rear_torque_Nm: NotNegative
-    """The same for a rear wheel; both together set the balance [N m]."""
+    """Torque of a rear wheel at full pedal. Both torques together set the balance [N m]."""
     drag_torque_Nm: NotNegative = 0.0
     """Dry friction of released pads, bearings and seals, per wheel [N m]."""
     stiffness_Nmprad: Positive = 1e5
@@ -129,13 +129,13 @@ class Brakes:
     parking_torque_Nm: NotNegative = 700.0
     """Torque of a rear wheel with the parking brake fully applied, by cable or spindle, without pressure [N m]."""
     hydraulics: Hydraulics = Hydraulics()
-    """Pressures."""
+    """Hydraulics of the pedal and the wheel brakes."""
     control_interval_s: Annotated[float, Range(0.001, 0.02)] = 0.005
     """Interval of the decisions of anti-lock and traction control [s]."""
     abs: bool = True
-    """Whether the anti-lock system is on; it is inactive while no wheel is close to locking."""
+    """True if the anti-lock system is on. It is inactive while no wheel is close to locking."""
     tcs: bool = False
-    """Whether traction control is on."""
+    """True if traction control is on."""
     antilock: Antilock = Antilock()
     """Settings of the anti-lock system."""
     traction: TractionControl = TractionControl()
@@ -186,7 +186,7 @@ allowed difference of the front wheels' pressures; steps_left: steps until the n
 """
 
 PLACES: Final = {name: place[1] // 8 for name, place in (BRAKE_STATE.fields or {}).items()}
-"""Field of a `BRAKE_STATE` -> its (first) place among the numbers."""
+"""First place of each field of a `BRAKE_STATE` among its numbers."""
 
 NO_LIMIT_NM: Final = 1e9
 """Drive torque limit without effect [N m]."""

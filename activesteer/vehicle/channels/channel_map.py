@@ -179,13 +179,13 @@ def _widths(wanted: list[tuple[int, Values]], inputs: Iterable[Column]) -> list[
 
 
 def _copies(wanted: list[tuple[Column, int]]) -> tuple[NDArray[np.intp], ...]:
-    """Tables of the copied columns for `take_rows`: array ends, columns and target columns."""
+    """Return the tables of the copied columns for `take_rows`: array ends, columns and target columns."""
     order = sorted((RawRows._fields.index(array), column, place) for (array, column), place in wanted)
     arrays, columns, places = np.array(order, np.intp).reshape(-1, 3).T.copy()
     return np.searchsorted(arrays, np.arange(len(RawRows._fields)), side="right"), columns, places
 
 
 def _of_kind(kind: type[AxialForce | Actuator], wanted: list[tuple[int, Any]]) -> tuple[NDArray[Any], NDArray[np.intp]]:
-    """Tables of a kind of channel for `take_rows`: laws, and target columns."""
+    """Return the tables of a kind of channel for `take_rows`: laws, and target columns."""
     laws = [(values, place) for place, values in wanted if isinstance(values, kind)]
     return np.array([law for law, _ in laws], record_of(kind)), np.array([place for _, place in laws], np.intp)

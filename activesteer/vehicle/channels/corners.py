@@ -36,7 +36,7 @@ from activesteer.vehicle.toe_links import SCREW
 
 _MEANINGS: Final = read_toml(Path(__file__).with_name("channels.toml"))[0]
 _BRAKE_FIELDS: Final = ("demand_Pa", "pressure_Pa", "phase", "reference_mps", "tcs_active")
-"""Fields of `BRAKE_STATE` whose channels are those of the table `brakes`."""
+"""Fields of `BRAKE_STATE` that are also channels of the table `brakes`."""
 
 
 def _of_wheel(table: str, index: int, name: str, values: Values) -> Signal:
@@ -98,9 +98,9 @@ def design_heights_m(model: mujoco.MjModel) -> list[float]:
 
 
 STANDSTILL_MPS: Final = 0.2
-"""Below this speed a sideslip angle has no meaning and is recorded as 0 [m/s]: a car at rest swings on its tyres."""
+"""Speed below which a sideslip angle is meaningless and recorded as 0 [m/s]: a car at rest swings on its tyres."""
 FULL_SIDESLIP_MPS: Final = 1.0
-"""From this speed on the recorded sideslip angle is the true one; below, it fades to 0 at `STANDSTILL_MPS` [m/s]."""
+"""Speed from which the true sideslip angle is recorded; below, it fades to 0 at `STANDSTILL_MPS` [m/s]."""
 ROCKS_BACK_MPS: Final = 1.0
 """Limit for driving backwards, for a stopped car that swings back on suspension and tyres [m/s]."""
 
@@ -285,7 +285,7 @@ def _has_motor(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _state(model: mujoco.MjModel, name: str) -> Column:
-    """Activation of an actuator."""
+    """Return the column of an actuator's activation."""
     return Column("act", int(model.actuator_actadr[model.actuator(name).id]))
 
 

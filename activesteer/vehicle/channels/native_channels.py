@@ -36,7 +36,7 @@ class RawRows(NamedTuple):
     measured: Array
     """Measurement on which driver and controller based their commands, or empty with ideal sensors."""
     brakes: Array
-    """A `BRAKE_STATE`."""
+    """State of an `ElectricDrive`, or empty without motors."""
     electric: Array
     """State of an `ElectricDrive`, or empty without motors."""
     estimate: Array
@@ -140,7 +140,7 @@ _LENGTH, _VELOCITY, _CTRL, _ACT, _FORCE = (
 
 @inlined
 def _place(array, row, column):
-    """Pointer to a number, which avoids numba's check for negative indices."""
+    """Return a pointer to a number, which avoids numba's check for negative indices."""
     return f64_pointer(array.ctypes.data + row * array.strides[0] + column * array.strides[1])
 
 
