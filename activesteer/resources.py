@@ -133,7 +133,7 @@ def _vehicle_in(folder: Path) -> Path:
 
 
 def check_own(file: Path) -> None:
-    """Refuse to change a file of an installed package.
+    """Reject a change to a file of an installed package.
 
     Raises:
         ParameterError: the file belongs to one.

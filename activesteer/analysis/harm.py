@@ -65,7 +65,7 @@ def _leaves_course(metrics: Metrics) -> bool:
 
 
 def losses(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Describe the failures of a run with these metrics."""
+    """Describe the failures that the metrics of a run show."""
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
         yield f"lost: sideslip angle of {math.degrees(peak):.0f} deg" if math.isfinite(peak) else "lost"
@@ -79,7 +79,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def failures(recording: Recording) -> Iterator[str]:
-    """Describe the failures of a run, and for how long its steering actuators were at their limits before a spin."""
+    """Describe the failures of a run, with the time of its steering actuators at their limits before a spin."""
     yield from losses(recording.metrics)
     if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
@@ -99,7 +99,7 @@ def failures(recording: Recording) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Yield the requirements of the manoeuvre that a run with these metrics met."""
+    """Yield the requirements of its manoeuvre that a run met, by its metrics."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):

@@ -117,7 +117,7 @@ def is_uneven(recording: RecordingLike) -> bool:
 
 
 def ride_metrics(recording: RecordingLike) -> dict[str, float]:
-    """Return the metrics of the ride."""
+    """Return the metrics of ride comfort and of the wheels on an uneven road."""
     road = road_of(recording.metadata)
     extended = [
         road.extended_share(*(recording[f"{corner}_contact_{axis}_m"][::_EVERY] for axis in "xy")) for corner in CORNERS
@@ -154,7 +154,7 @@ def weighted(acceleration_mps2: Array, step_s: float) -> Array:
 
 
 def weighting(frequency_Hz: Array) -> NDArray[np.complex128]:
-    """Return the complex gain of the weighting W_k."""
+    """Return the complex gain of the weighting W_k at given frequencies."""
     s = 2j * math.pi * frequency_Hz
 
     def quadratic(at_Hz: float, quality: float) -> NDArray[np.complex128]:

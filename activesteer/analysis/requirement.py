@@ -78,7 +78,7 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """Number that follows from the metrics of runs.
+    """Numerical expression over the metrics of runs.
 
     `metrics` has those that it reads, each with its run.
 

@@ -67,7 +67,7 @@ _SAME_FRICTION: Final = 1e-3
 
 
 def changed_friction(recording: RecordingLike) -> tuple[list[tuple[float, float]], tuple[float, float]]:
-    """Return the times when a wheel's friction differs from its initial friction [s], and its least and greatest."""
+    """Return the times of a wheel friction other than the initial friction [s], and the range of this friction."""
     try:
         mu = np.array([recording[f"{corner}_mu"] for corner in CORNERS])
     except RecordingError:  # a recording of another program

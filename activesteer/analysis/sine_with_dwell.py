@@ -168,7 +168,7 @@ def _crossing_before(time_s: Array, values: Array, index: int) -> float:
 
 
 def _completion(time_s: Array, angle: Array, start: int) -> float:
-    """Return the time when the second half, here positive, is back at the centre."""
+    """Return the time when the steering wheel is back at the centre after the second half-wave, here positive."""
     # With an elastic steering system the wheel may creep over the last degrees or stop short of the centre. The line
     # through 10 and 5 deg is then extrapolated to the centre, so that creep does not delay the completion.
     below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)

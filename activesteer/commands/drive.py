@@ -64,7 +64,7 @@ class _Failures(dict[str, str]):
 
     @contextmanager
     def caught(self, label: str, *, alone: bool) -> Iterator[None]:
-        """Report an error of a controller, and end the command if no other controller drives."""
+        """Report an error of a controller, and end the command if no other controller is left."""
         try:
             yield
         except ActiveSteerError as error:

@@ -143,7 +143,7 @@ def _files(output: Path | None) -> list[Path]:
 
 
 def _part(path: Path, *, in_order: bool) -> str:
-    """Return how much of a run a recording holds, empty for a complete run and for other files."""
+    """Describe the part of a run that a recording holds, empty for a complete run and for other files."""
     if path.suffix != ".mcap":
         return ""
     with path.open("rb") as file:

@@ -59,7 +59,7 @@ class Esc:
 
 
 def beyond(value: float, band: float) -> float:
-    """Return by how much a value exceeds a dead band around 0."""
+    """Return the part of a value that is beyond a dead band around 0."""
     return value - band if value > band else value + band if value < -band else 0.0
 
 
@@ -71,7 +71,7 @@ def stabilising(p: EscParameters, error_radps: float, sideslip_rad: float) -> fl
 
 
 def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
-    """Return the brake torque of one wheel per yaw moment: rolling radius over half the track, front and rear [-]."""
+    """Return the brake torque of one wheel per yaw moment: rolling radius per half the track, front and rear [-]."""
     known = setup.estimation
     assert known is not None  # an estimator exists
     front_m, _, rear_m, _ = known.rolling_radius_m
@@ -82,7 +82,7 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
 def wheel_torques(
     moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
 ) -> tuple[float, float, float, float]:
-    """Return the brake torques for a yaw moment by one wheel, in the order of `CORNERS` [Nm].
+    """Return the brake torques that create a yaw moment with one wheel, in the order of `CORNERS` [Nm].
 
     Args:
         moment_Nm: Yaw moment, left positive [Nm].

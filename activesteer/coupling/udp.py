@@ -47,7 +47,7 @@ class UdpPort(NamedTuple):
 
     @classmethod
     def read(cls, text: str, timeout_s: float, reaction: str) -> UdpPort:
-        """Read `PORT` or `HOST:PORT`."""
+        """Parse `PORT` or `HOST:PORT`."""
         host, _, port = text.rpartition(":")
         try:
             return cls(int(port), str(ipaddress.IPv4Address(host or cls._field_defaults["host"])), timeout_s, reaction)

@@ -52,7 +52,7 @@ class HumanDriver(NativeBlock):
         self._path = PathPreviewDriver(robot, single_track.matrices, setup.parameters, setup.timestep_s)
 
     def prepare(self, speed_mps: float) -> int:
-        """Compute the gains on a path at a speed for compiled code, and return how many there are.
+        """Compute the gains on a path at a speed for compiled code, and return their count.
 
         Raises:
             SimulationDiverged: the speed is implausibly high.

@@ -62,12 +62,12 @@ class Estimator(NativeBlock):
 
     @property
     def innovation(self) -> float:
-        """Squared error of the last measured yaw rate and lateral acceleration, over its expected covariance."""
+        """Squared error of the last measured yaw rate and lateral acceleration, divided by its expected covariance."""
         return float(self._memory["innovation"][0])
 
     @property
     def rate_innovation(self) -> float:
-        """Squared error of the last measured yaw rate only, over its expected variance."""
+        """Squared error of the last measured yaw rate only, divided by its expected variance."""
         return float(self._memory["rate_innovation"][0])
 
     def step(self, measurement: Measurement) -> Estimate:

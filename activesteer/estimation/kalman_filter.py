@@ -119,7 +119,7 @@ def begin(known, memory):
 
 @inlined
 def _step_of(state, place):
-    """Step of a finite difference, away from zero. Mirrored states then have mirrored derivatives."""
+    """Return the step of a finite difference, away from zero. Mirrored states then have mirrored derivatives."""
     return math.copysign(_DIFFERENCES[place], state[place])
 
 
@@ -131,7 +131,7 @@ def _is_braked(known, memory):
 
 @inlined
 def _force_errors(known, front_N, rear_N):
-    """Variances of the force errors of both axles [N2]."""
+    """Return the variances of the force errors of both axles [N2]."""
     front = known.force_std_N + known.force_fraction * abs(front_N)
     rear = known.force_std_N + known.force_fraction * abs(rear_N)
     return front * front, rear * rear
@@ -242,7 +242,7 @@ def predict(known, tyres, memory, duration_s):
 
 @inlined
 def _with_friction(known, tyres, memory, friction):
-    """Return the lateral acceleration from the tyre forces on another friction [m/s2]."""
+    """Return the lateral acceleration from the tyre forces at another friction [m/s2]."""
     memory.state[FRICTION] = friction
     front_N, rear_N = forces_of(known, tyres, memory, memory.state)
     across_N = front_N * math.cos(memory.front_angle_rad) + rear_N * math.cos(memory.rear_angle_rad)

@@ -215,7 +215,7 @@ class DriveSession:
 
     @property
     def done(self) -> bool:
-        """True at the end of the longest drive."""
+        """True when the longest allowed drive has ended."""
         return self._simulation.done
 
     def frame(self) -> Reply:
@@ -311,7 +311,7 @@ class DriveSession:
         self._front_x_m = x_m
 
     def _result(self) -> str:
-        """Describe the time of the last lap or of the gates, with the cones, or return an empty text."""
+        """Describe the time of the last lap or of the gates, with the cones hit, or return an empty text."""
         penalty_s = _CONE_S * self._hit
         cones = f"{self._hit} cone{'' if self._hit == 1 else 's'} hit (+{penalty_s:g} s)" if self._hit else ""
         if self._missed:

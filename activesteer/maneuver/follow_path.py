@@ -198,7 +198,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
 
 @dataclass(frozen=True)
 class Circle:
-    """The circle and the speed on it."""
+    """Circle, and the speed on it."""
 
     radius_m: Annotated[float, Range(-2000.0, 2000.0)] = 100.0
     """Radius of the path of the centre of gravity [m], positive to the left."""

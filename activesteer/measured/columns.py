@@ -61,7 +61,7 @@ def understood(path: Path, what: str) -> Iterator[None]:
 
 
 def numbers(values: Any, name: str, path: Path) -> Array:
-    """Convert values to numbers, and times to seconds since the first one."""
+    """Convert values to numbers, and times to seconds since the first time."""
     try:
         array = np.asarray(values)
         if array.dtype.kind in "mM":
@@ -212,12 +212,12 @@ def _numbered(columns: list[Column]) -> list[Column]:
 
 
 def second_of(name: str) -> str:
-    """Return the name that distinguishes the second column of a name from the first."""
+    """Return the name that distinguishes a second column from the first column of the same name."""
     return f"{name} (2)"
 
 
 def find(columns: list[Column], name: str, path: Path) -> Column:
-    """Return the column with a name."""
+    """Return the column with a given name."""
     found = [column for column in columns if column.name == name]
     if found:
         return found[0]

@@ -220,7 +220,7 @@ class _Case:
         }
 
     def parts(self, stage: str, runs: Mapping[str, Recording]) -> list[Part]:
-        """Compare runs in all windows."""
+        """Compare the runs in all windows, and return the comparisons."""
         table, found = self.file.table, []
         for run in table.runs:
             result = compare(
@@ -235,7 +235,7 @@ class _Case:
 
 
 def _cut(one: Compared, begin: float, end: float) -> Compared:
-    """Return a comparison in a window."""
+    """Return the part of a comparison in a window."""
     rows = (one.x >= begin) & (one.x <= end)
     if np.count_nonzero(rows) < _LEAST_SAMPLES:
         raise ParameterError(f"a window of {end - begin:g} s has fewer than {_LEAST_SAMPLES} samples")

@@ -288,7 +288,7 @@ def _signal(name: str, source: _Source, time_s: Array, values: Array, chosen: Me
 
 
 def _plausible(values: Array, column: str, path: Path) -> Array:
-    """Return the values if they are plausible for a file."""
+    """Return the values, or reject values that are implausible in a file."""
     limits.check_numbers(values, RecordingError, infinite=True, file=path.name, key=f"column {shown(column)}")
     return values
 

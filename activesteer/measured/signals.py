@@ -59,7 +59,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def is_time(name: str) -> bool:
-    """Return whether the name of a column is the name of a time."""
+    """Return whether a column holds times, by its name."""
     return name == "time_s" or _word(split_unit(name)[0]) in _NAMES["time"].split()
 
 
@@ -301,7 +301,7 @@ def at_sensor(run: Recording) -> Recording:
 
 
 def moved_car(vehicle: Vehicle, time_s: Array, channels: Mapping[str, Array]) -> Poses | None:
-    """Return the poses of a car along the path for replay, or None without a path."""
+    """Return the poses of a car along the measured path for replay, or None without a path."""
     if not {"x_m", "y_m", "yaw_rad"} <= set(channels):
         return None
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import

@@ -81,7 +81,7 @@ def inlined_by_llvm(function: Callable[..., Any]) -> Any:
 
 
 def _know_shared() -> None:
-    """Make the functions that are marked as shared known to compiled code."""
+    """Register the functions that are marked as shared with compiled code."""
     while MARKED:
         register_jitable(error_model="numpy")(MARKED.pop())
 

@@ -55,7 +55,7 @@ def array_of(memory):
 
 @overload(table)
 def _table(numbers):
-    """Let a shared law read the numbers of a block."""
+    """Let compiled laws read the numbers of a block."""
     if isinstance(numbers, types.Record):
         return lambda numbers: array_of(numbers)  # noqa: PLW0108 - numba asks for a function of Python
     return None

@@ -132,7 +132,7 @@ def _is_numeric(column: Sequence[str]) -> bool:
 
 
 class Table(NamedTuple):
-    """A table of a page.
+    """Table of a page: columns, rows, and their layout.
 
     Attributes:
         title: Its title; empty for none.
@@ -184,7 +184,7 @@ class Table(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section of a page.
+    """Section of a page: a heading, paragraphs, tables and figures.
 
     Its parts follow each other in the order of the attributes.
 

@@ -89,7 +89,7 @@ def link_ends(run: ReplayedRun, link: Link) -> list[NDArray[np.float64]]:
 
 
 def _send_rods(stream: rr.RecordingStream, run: ReplayedRun, links: list[Link]) -> None:
-    """Send all springs in one entity, because each of them changes at every pose."""
+    """Send all rods in one entity, because each of them moves at every pose."""
     parts = []
     radii: list[float] = []
     colours: list[list[int]] = []

@@ -184,7 +184,7 @@ def blueprint(runs: Sequence[ReplayedRun], *, compare: bool, page: int = 0) -> r
 
 
 def _page(run: ReplayedRun, runs: Sequence[ReplayedRun], page: int) -> rrb.Horizontal:
-    """Return the page of a single run with all its views."""
+    """Return the layout of the page of a single run, with all its views."""
     return rrb.Horizontal(
         rrb.Vertical(
             _chase(run, runs),
@@ -211,7 +211,7 @@ def _tab(name: str, shown: Sequence[Panel], run: ReplayedRun, *, alone: bool) ->
 
 
 def _comparison(runs: Sequence[ReplayedRun], page: int) -> rrb.Horizontal:
-    """Return the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
+    """Return the layout of the page of all runs: a view for each car, with the others as ghosts, and overlaid plots."""
     loads, use = panels_in(WHEELS)[:2]
     return rrb.Horizontal(
         rrb.Vertical(

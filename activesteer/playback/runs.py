@@ -114,7 +114,7 @@ def runs_of(recordings: Mapping[str, Recording]) -> list[ReplayedRun]:
 
 
 def _shown(time_s: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Thin rows to about `PLOT_RATE_HZ` per second, and keep the last one."""
+    """Thin rows to about `PLOT_RATE_HZ` per second, and keep the last row."""
     span_s = float(time_s[-1] - time_s[0])
     step = max(1, round((len(time_s) - 1) / (span_s * PLOT_RATE_HZ))) if span_s > 0.0 else 1
     rows = np.arange(0, len(time_s), step)

@@ -42,7 +42,7 @@ def new_stream(runs: Sequence[ReplayedRun], *, compare: bool) -> rr.RecordingStr
 
 
 def fill(stream: rr.RecordingStream, runs: Sequence[ReplayedRun], layout: rrb.Blueprint, how: Showing) -> None:
-    """Send all data of the runs."""
+    """Send all data of the runs to a stream."""
     stream.send_blueprint(layout, make_active=True, make_default=True)
     several = len(runs) > 1
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)

@@ -66,7 +66,7 @@ class Kind:
         return isinstance(given, (str, os.PathLike)) and (os.fspath(given).endswith(".toml") or given in self.data())
 
     def fail(self, name: str, problem: str, value: Any = None, allowed: Any = None) -> ActiveSteerError:
-        """Return an error about the block."""
+        """Return an error about the user's block."""
         return self.error(problem, key=f"{self.word} {name}".rstrip(), value=value, allowed=allowed)
 
     def checked(self, command: Any, name: str, setup: Any, said: str = "step returned") -> Any:
@@ -185,7 +185,7 @@ def _words(error: BaseException) -> str:
 
 
 def _nearest_attributes(given: Any, name: str) -> str:
-    """Return a hint with the attributes closest to a wrong name, including attributes of inner dataclasses."""
+    """Return a hint with the attributes closest to a wrong name, including the attributes of inner dataclasses."""
     known = _attributes(given)
     last = {path.rpartition(".")[2]: path for path in sorted(known, key=lambda path: -path.count("."))}
     close = difflib.get_close_matches(name, last, n=3, cutoff=0.6)

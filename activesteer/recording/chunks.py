@@ -130,7 +130,7 @@ class BlockEncoder:
         positions_m: NDArray[np.float64],
         quaternions: NDArray[np.float64],
     ) -> ChunkData:
-        """Encode a block."""
+        """Encode a block of rows and poses."""
         rows, poses = len(row_ns), len(pose_ns)
         self._encode_rows(row_ns, values)
         self._encode_poses(pose_ns, positions_m, quaternions)

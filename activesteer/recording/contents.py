@@ -434,7 +434,7 @@ def _link_of(table: dict[str, Any]) -> Link:
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
-    """Parse a scene."""
+    """Parse a serialised scene."""
     update = message_class(SCENE_SCHEMA).FromString(data)
     limits.check_count(len(update.entities), limits.MAX_PARTS, "entities", RecordingError, key="scene")
     primitives: list[ScenePart] = []

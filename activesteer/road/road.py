@@ -44,7 +44,7 @@ _SHOWN_BESIDE_M: Final = 4.0
 
 @dataclass(frozen=True)
 class RoadPatch:
-    """A stretch of the road with its own friction, as a table [[road.patches]]."""
+    """A stretch of the road with a different friction, as a table [[road.patches]]."""
 
     start_m: float
     """Start along x or along the path, see `along`; included [m]."""

@@ -64,7 +64,7 @@ def _plateau_at(it, x, d):
 
 @compiled
 def _sine_at(it, x):
-    """Return height and slope of a wave that grows in its first period and fades in its last one."""
+    """Return height and slope of a wave that grows in its first period and fades in its last period."""
     part = x / it.length_m
     growth, rate = 1.0, 0.0
     if it.waves > 0.0 and part > it.waves - 1.0:
@@ -208,7 +208,7 @@ def rise_at(surface, numbers, s):
 
 @compiled
 def left_grid(surface, s, d):
-    """Return whether a position ahead of the start is outside the grid."""
+    """Return whether a position beyond the start is outside the grid."""
     if surface.rows == 0.0 or s < surface.start_m:
         return False
     along = (s - surface.grid_s_m) * surface.grid_per_s

@@ -108,7 +108,7 @@ def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> di
 
 
 def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
-    """Return the overrides without the entries of the table [controllers] that only other controllers read."""
+    """Return the overrides, without the gains that only other controllers read."""
     unread = unread_gains(overrides, [controller])
     return {key: value for key, value in overrides.items() if key not in unread}
 

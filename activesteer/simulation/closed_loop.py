@@ -97,7 +97,7 @@ class LoopState:
 
 
 class ClosedLoop(Uncopyable):
-    """A manoeuvre, a driver, a controller and a car.
+    """Closed loop of a manoeuvre, a driver, a controller and a car.
 
     Attributes:
         scenario: Manoeuvre, car and driver, with the changes made during the run.
@@ -228,7 +228,7 @@ class ClosedLoop(Uncopyable):
         self.blocks = self.blocks[0], controller
 
     def replace_controller(self, controller: Any) -> None:
-        """Replace the controller by another one with a new control unit (see `activesteer.plugins.find`).
+        """Replace the controller by another controller with a new control unit (see `activesteer.plugins.find`).
 
         Raises:
             ControllerError: there is no such controller, or it cannot be created.
@@ -291,7 +291,7 @@ class ClosedLoop(Uncopyable):
         self._ended = True
 
     def fail(self, faults: Sequence[Fault], *, more: bool = False) -> None:
-        """Replace the faults by others, with their own times.
+        """Replace the faults by other faults, with their own times.
 
         Args:
             faults: The faults.
@@ -486,7 +486,7 @@ class ClosedLoop(Uncopyable):
             self._record["torques_Nm"] = torque_numbers(torques)
 
     def _give_actuator_command(self, command: Any) -> None:
-        """Send the car a command that takes effect at once."""
+        """Send the car a command that takes effect immediately."""
         write_command(ActuatorCommand, self._actuator_at, command)
         self._check_driven(command)
         if command.estimate is not None:

@@ -108,7 +108,7 @@ class Recorder(Uncopyable):
         return int(self._tape["rows"][0])
 
     def make_room(self) -> None:
-        """Take the rows from the tape, and flush a full block."""
+        """Flush a full block, or copy the rows from a full tape."""
         if self.rows - self._flushed == self._block_rows:
             self.flush()
         elif not self._tape["room"][0]:
@@ -129,7 +129,7 @@ class Recorder(Uncopyable):
         self._tape["row"] = self._tape_start
 
     def _take(self) -> None:
-        """Take the rows from the tape."""
+        """Copy the rows from the tape into memory."""
         taken, last = self._taken, self.rows
         if taken < last:
             values = self._kept.values[taken - self._first : last - self._first]
@@ -207,7 +207,7 @@ class Recorder(Uncopyable):
         self._rewind()
 
     def _complaint(self, first: int, values: NDArray[np.float64], poses: Poses) -> SimulationDiverged:
-        """Error for a block with a value that is not finite."""
+        """Return the error for a block with a value that is not finite."""
         wrong = ~(np.abs(values) <= MAX_VALUE)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))

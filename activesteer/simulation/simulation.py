@@ -247,7 +247,7 @@ class Simulation(Copyable):
                     self._given[word] = self._given.get(word, 0) + self._recorder.rows - rows
 
     def _drive_by_the_clock(self, steps: int, given: Given) -> None:
-        """Drive steps one by one at their times by the clock, with the commands that have arrived."""
+        """Drive single steps, each at its time by the clock, with the commands that have arrived."""
         pacer, link, loop = self._pacer, self._link, self.loop
         collects = gc.isenabled()
         gc.disable()  # a collection takes longer than a step

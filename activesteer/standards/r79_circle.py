@@ -226,7 +226,7 @@ def _shown(row: Mapping[str, Any], name: str) -> float:
 
 
 def _dots(faults: list[dict[str, Any]]) -> Picture:
-    """Return a row for each fault with an effect, with the right circle below the left one."""
+    """Return a figure with a row for each fault with an effect, with the right circle below the left circle."""
     names = _with_effect(faults)
 
     def panel(figure: str, label: str) -> Panel:

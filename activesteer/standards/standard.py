@@ -93,7 +93,7 @@ class StandardRunner:
     progress: Callable[[str, int, int], None]  # called with the series, number of finished runs, and number of all runs
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
-        """Resolve the car and a manoeuvre."""
+        """Resolve a manoeuvre with the car of the runner."""
         changes = {**(overrides or {}), **self.overrides}
         return resolve(maneuver, self.vehicle, changes, self.driver, [self.controller])
 

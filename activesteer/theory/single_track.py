@@ -160,7 +160,7 @@ class SingleTrack(NativeBlock):
         return rear_prediction(self, speed_mps)
 
     def state_space(self, speed_mps: float) -> control.StateSpace:
-        """Return the model at a speed, eqs. 1 and 2.
+        """Return the state-space model at a speed, eqs. 1 and 2.
 
         Args:
             speed_mps: Speed v > 0 [m/s].

@@ -37,7 +37,7 @@ def _nominal(params: TyreParameters) -> float:
 
 
 def key_figures(params: TyreParameters) -> dict[str, Any]:
-    """Return key figures of a tyre."""
+    """Return the key figures of a tyre, for the report."""
     nominal = params["FNOMIN"]
     loads = [fraction * nominal for fraction in _LOADS if params["FZMIN"] <= fraction * nominal <= params["FZMAX"]]
     return {
@@ -198,7 +198,7 @@ def _in_degrees(angle_rad: float) -> str:
 
 
 def _loads(params: TyreParameters) -> list[float]:
-    """Loads of the curves [N], rounded to 100 N, within the range of the file."""
+    """Return the loads of the curves [N], rounded to 100 N, within the range of the file."""
     low, high = params["FZMIN"], params["FZMAX"]
     loads = [max(round(fraction * params["FNOMIN"] / 100.0) * 100.0, 100.0) for fraction in _LOAD_FRACTIONS]
     return [load for load in loads if low <= load <= high] or [_nominal(params)]
@@ -276,7 +276,7 @@ def _friction_ellipse(formula: MagicFormula) -> Picture:
 
 
 def _combined_slip(formula: MagicFormula) -> Picture:
-    """Forces versus slip for several slip angles, and lateral versus longitudinal force."""
+    """Draw the forces versus slip for several slip angles, and lateral versus longitudinal force."""
     params = formula.parameters
     nominal, kappa = _nominal(params), _within(params, "KPUMIN", "KPUMAX", _WIDEST_SLIP)
     angles = [math.radians(value) for value in (0, 2, 4, 8, 12)]
@@ -334,7 +334,7 @@ def _scalar_calls(tyre, count, pressure_Pa):
 
 
 def bench(params: TyreParameters, rounds: int = _ROUNDS) -> dict[str, float]:
-    """Measure the time of the full evaluation on one core."""
+    """Measure the time of the full evaluation of a tyre on one core."""
     record, pressure = np.atleast_1d(params.record), params["INFLPRES"]
     rng = np.random.default_rng(0)
     rows = [rng.uniform(low, high, _CALLS) for low, high in ((500, 8000), (-0.2, 0.2), (-0.2, 0.2), (-0.05, 0.05))]

@@ -468,7 +468,7 @@ class Vehicle(Uncopyable):
                 self.sensors.reset(self.truth()[0])
 
     def act_in_every_step(self, faults: NDArray[Any] | None) -> None:
-        """Apply records of `faults.FAULT` in every step, or None without faults."""
+        """Set the `faults.FAULT` records that act in every step, or None without faults."""
         acting = None if faults is None or not faults.size else faults
         self._faults, self._bindings["n_faults"] = acting, 0 if acting is None else acting.size
         self._bindings["faults"] = 0 if acting is None else acting.ctypes.data

@@ -355,7 +355,8 @@ _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 @inlined
 def _place(table, position):
-    """Return the interval of a position on a spline, the fraction of it, and the excess beyond an end in intervals."""
+    """Return a position on a spline: its interval, the fraction within it, and the excess in intervals beyond an
+    end."""
     at = (position - table.start_m) * table.per_m
     count = table.intervals
     inside = min(max(at, 0.0), count)

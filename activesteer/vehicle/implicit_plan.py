@@ -263,7 +263,7 @@ class ImplicitPlan:
         return {"plan": self.plan, **{f"plan_{name}": part for name, part in zip(names, self._memory, strict=True)}}
 
     def _freeze(self) -> None:
-        """Keep a copy of the data from which the plan was made."""
+        """Keep a copy of the data on which the plan depends."""
         model = self._model
         self._settings = self._current_settings()
         self._copies = [getattr(model, name).copy() for name in ARRAYS]
@@ -279,7 +279,7 @@ class ImplicitPlan:
         return (*_options(self._model.opt), mujoco.get_mjcb_control())
 
     def follow(self) -> None:
-        """Plan again if the data behind the plan have changed.
+        """Renew the plan if the data on which it depends have changed.
 
         This takes two microseconds if nothing has changed. All other changes take effect in each step anyway.
         """

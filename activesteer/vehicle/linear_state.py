@@ -170,7 +170,7 @@ _MIN_LIKENESS: Final = 0.9
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode: a real pole or a conjugate pair.
+    """One mode of the linearised car: a real pole or a conjugate pair.
 
     It is named after the part that participates most. The eigenvalue has no negative imaginary part; the participation
     factors have the sum 1, largest first. `shape` and `left` are right and left eigenvector, whose product is 1.

@@ -271,7 +271,7 @@ def _drive_motor_limits(motor, speed_radps):
 
 @inlined
 def _followed(motor, torque_Nm, target_Nm):
-    """Return the torque one step later."""
+    """Return the torque of a motor one step later, after lag and rate limit."""
     if motor.stuck != 0.0:
         return torque_Nm
     change = motor.follow * (target_Nm - torque_Nm)

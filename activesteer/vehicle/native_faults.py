@@ -52,7 +52,7 @@ def keep(memory, capacity, value):
 
 @inlined
 def give_late(address, count):
-    """Apply the delayed demand of each part with such a fault, before a step."""
+    """Apply the delayed demand of each part with a delay fault, before a step."""
     for index in range(count):
         fault = carray(_pointer(address), (count,))[index]
         if fault.kind == DEMAND and fault.state == ACTS:

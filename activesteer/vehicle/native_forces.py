@@ -63,7 +63,7 @@ def _our_block(model, m_count, m_numbers):
 
 @inlined
 def _apply(qfrc, cdof, chain, fx, fy, fz, tx, ty, tz):
-    """Add J^T w for a wrench about the tree's centre of mass."""
+    """Add J^T w to the generalised forces, for a wrench w about the tree's centre of mass."""
     for index in range(chain.size):
         dof = int(chain[index])
         axis = 6 * dof

@@ -94,7 +94,7 @@ def _fit(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class _Corner:
-    """Coordinates of a corner, and the link lengths that constrain them."""
+    """Coordinates of a rear corner, and the link lengths that constrain them."""
 
     def __init__(self, model: mujoco.MjModel, corner: str, link: str) -> None:
         self._model, self._data = model, mujoco.MjData(model)
@@ -134,7 +134,7 @@ class _Corner:
         return missing
 
     def angles(self, travels_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the steer angles at several lengths [rad], each searched from the previous one."""
+        """Return the steer angles at several lengths [rad], each searched from the previous angle."""
         middle = len(travels_m) // 2
         outwards = [self._along(travels_m[middle:]), self._along(travels_m[middle::-1])]
         return np.concatenate([outwards[1][:0:-1], outwards[0]])

@@ -184,7 +184,7 @@ def check_vehicle(vehicle: str | os.PathLike[str]) -> CheckReport:
 
 
 def _riding(result: KcResult) -> Iterator[Finding]:
-    """Compare the metrics of the rig with the usual values for passenger cars."""
+    """Compare the metrics of the rig with the usual values of passenger cars."""
     yield from _metrics(result, "riding")
     front, rear = result["front", "ride_frequency"], result["rear", "ride_frequency"]
     yield judged("ride_ratio", rear / front)

@@ -81,7 +81,7 @@ _BELOW_MOUNT_M = 0.07
 def top_mount(
     axle: str, table: TopMountTable | None, kind: AxleKind, points: dict[str, Array], damper: Mount, log: Log
 ) -> TopMount | None:
-    """Complete the top mount of an axle, or return None for a rigid one."""
+    """Complete the top mount of an axle, or return None for a rigid mount."""
     if table is None and not kind.strut:
         return None
     key, table = f"{axle}.top_mount", table or TopMountTable()

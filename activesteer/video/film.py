@@ -190,7 +190,7 @@ class _Pane:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
 
     def picture(self, canvas: Offscreen, time_s: float) -> NDArray[np.uint8]:
-        """Return the frame of a time, without gauges."""
+        """Return the frame at a time, without gauges."""
         for number, track in enumerate(self._tracks):
             self.scene.place(number, *track.poses(time_s))
         self.scene.update()

@@ -41,7 +41,7 @@ _SHOWN_RAD: Final = np.radians(0.3)
 
 
 class Track:
-    """Poses of a car between the first and the last usable one."""
+    """Poses of a car between the first and the last usable pose."""
 
     def __init__(self, recording: Recording, name: str) -> None:
         """Read the poses that can be drawn."""

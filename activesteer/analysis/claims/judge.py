@@ -47,7 +47,7 @@ RunMetrics = dict[str, dict[str, float]]
 
 
 class Kind(StrEnum):
-    """Subject of the statements about a manoeuvre."""
+    """Subject of the statements about a manoeuvre: the systems, or also the driver."""
 
     SYSTEMS = "property of the systems"
     """The steering wheel follows a table. Car, road and system determine the result."""
@@ -191,7 +191,7 @@ def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> 
 
 
 def straight_ahead(recording: RecordingLike) -> slice:
-    """Return the samples before the steering wheel is first turned."""
+    """Return the samples before the steering wheel is first turned, as a slice."""
     turned = np.abs(recording["steering_wheel_rad"]) > AHEAD_RAD
     return slice(0, int(np.argmax(turned)) if turned.any() else len(turned))
 

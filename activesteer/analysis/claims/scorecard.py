@@ -38,7 +38,7 @@ _NO_SETTING: Final = frozenset({"vehicle", "duration_s", "settle_s", "title"})
 
 @dataclass(frozen=True)
 class Number:
-    """A number of a setting."""
+    """A number of a setting, with its nominal value and its allowed range."""
 
     key: str
     """Dotted key, as for `--set`."""

@@ -78,7 +78,7 @@ TOP_SPEED_MPS: Final = 200.0 / 3.6
 
 
 def figure_7(recording: RecordingLike) -> Figure:
-    """Draw the predicted rear angle versus speed, and the part of it that the rear system uses."""
+    """Draw the predicted rear angle versus speed, and the fraction of this angle that the rear system uses."""
     single_track = _single_track(recording)
     gain = _number(_parameters(recording, "controllers", "ars"), "prediction_gain", 1.0)
     speed_mps = np.linspace(0.0, TOP_SPEED_MPS, 400)

@@ -266,7 +266,7 @@ def _events(group: Group) -> list[str]:
 
 
 def _facts(groups: Sequence[Group], made: date) -> list[str]:
-    """Return date, car, driver and versions of the program."""
+    """Return the date, the car, the driver, and the versions of the program."""
     recordings = [run.recording for group in groups for run in group.runs]
     facts = [made.isoformat()]
     for word, table, key in (

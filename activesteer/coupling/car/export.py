@@ -178,7 +178,7 @@ def _state(loop: ClosedLoop, memory: Memory, variables: Sequence[Variable]) -> n
 
 
 def _parts(loop: ClosedLoop, names: Sequence[str]) -> list[tuple[int | float, ...]]:
-    """Return the actuators that can fail in the format of car.c."""
+    """Return the actuators that can fail, in the format of car.c."""
     rows: list[tuple[int | float, ...]] = []
     for part in faulty_parts(loop):
         for name in ACTUATORS[part].members:

@@ -77,7 +77,7 @@ word of such a struct points."""
 
 
 class Relocation(NamedTuple):
-    """A word that holds an address."""
+    """Relocation of a word that holds an address."""
 
     place: int  # offset of the word in the memory of the car
     kind: int  # what it points to

@@ -48,7 +48,7 @@ _WIND_UP: Final[Row] = (
 
 
 def _moved(points: str, axis: int, *, outwards: bool = False) -> Callable[[Sweep], Array]:
-    """Return the motion of wheel centre or contact point along an axis [mm]."""
+    """Return the motion of the wheel centre or of the contact point along an axis [mm]."""
 
     def values(sweep: Sweep) -> Array:
         path = getattr(sweep, points)[..., axis]

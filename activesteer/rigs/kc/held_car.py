@@ -75,7 +75,7 @@ class Case:
 
 
 class HeldCar:
-    """A car on the rig.
+    """A car on the rig: chassis held, wheels on pads.
 
     Attributes:
         model: The engine's model.

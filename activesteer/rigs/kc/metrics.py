@@ -63,7 +63,7 @@ class Axle(NamedTuple):
         return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
 
     def beside(self, name: str) -> Axle:
-        """Return another axle of the same car."""
+        """Return an axle of the same car by its name."""
         return Axle(name, self.measured)
 
     def sweep(self, name: str) -> Sweep:

@@ -73,7 +73,7 @@ NAMES: Final = (
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of the car."""
+    """Natural frequency and damping ratio of one mode of the car."""
 
     frequency_Hz: float  # frequency of the undamped oscillation: magnitude of the eigenvalue [Hz]
     damping_ratio: float

@@ -65,7 +65,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Tuning:
-    """Result of a search: all sets, and the best ones."""
+    """Result of a search: all sets, and the best sets."""
 
     goal: Goal
     done: int  # number of all sets that were tried

@@ -192,7 +192,7 @@ class DriverLoop:
 def driver_loop(
     car: LinearCar, controller: LinearController, driver: DriverParameters, gains: SteeringGains, steering_ratio: float
 ) -> DriverLoop:
-    """Assemble the loop of car, controller and driver at one speed."""
+    """Assemble the linear loop of car, controller and driver at one speed."""
     steps = round(PREVIEW_INTERVAL_S / car.timestep_s)
     waiting = round(driver.reaction_delay_s / PREVIEW_INTERVAL_S)
     n, states = len(car.a), len(controller.a)

@@ -109,7 +109,7 @@ def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) ->
 
 
 def weakest(margins: Sequence[Margins]) -> Margins:
-    """Return the smallest of each margin, or the margins of an unstable loop if there is one."""
+    """Return the smallest value of each margin, or the margins of an unstable loop if there is one."""
     if unstable := [each for each in margins if each.disk == 0.0]:
         return unstable[0]
     return Margins(*(float(np.fmin.reduce(values)) for values in zip(*map(astuple, margins), strict=True)))
@@ -159,7 +159,7 @@ def _sensed(sensor: Sensor, step_s: float, back: Response, every: int) -> Respon
 
 
 def opened(returned: Response, loop: str) -> Response:
-    """Return the loop gain opened at one demand while the other one is closed. Stability is lost at 1 + L = 0."""
+    """Return the loop gain with the loop open at one demand and closed at the other. Stability is lost at 1 + L = 0."""
     own = LOOPS.index(loop)
     other = 1 - own
     through = returned[:, own, other] * returned[:, other, own] / (1.0 - returned[:, other, other])

@@ -72,7 +72,7 @@ def _without_comment(line: str) -> str:
 
 
 def _value(text: str) -> float | str:
-    """Parse a number, or return the string without its quotes."""
+    """Parse a number, or remove the quotes of a string."""
     found = number(text)
     if found is not None:
         return found
@@ -157,7 +157,7 @@ class Coefficient(NamedTuple):
 
 
 def _parse(table: str) -> tuple[Coefficient, ...]:
-    """Convert the table into records, in its order."""
+    """Parse the table of coefficients into records, in its order."""
     section, rows = "", []
     for line in table.splitlines():
         if line.startswith("["):

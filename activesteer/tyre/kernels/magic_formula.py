@@ -221,7 +221,7 @@ def clamp(x: float, low: float, high: float) -> float:
 
 @compiled
 def relative_pressure(p, pressure_Pa: float) -> float:
-    """Return the relative deviation of the pressure from the nominal pressure."""
+    """Return the relative deviation of the inflation pressure from the nominal pressure."""
     return clamp(pressure_Pa, p.PRESMIN, p.PRESMAX) / p.NOMPRES - 1.0
 
 

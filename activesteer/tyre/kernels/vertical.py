@@ -32,7 +32,7 @@ def free_radius(p, omega_radps: float) -> float:
 
 @compiled
 def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: float) -> float:
-    """Effective rolling radius [m], forward speed over rotational speed of a wheel that rolls freely (equation 7).
+    """Effective rolling radius [m]: forward speed of a freely rolling wheel over its rotational speed (equation 7).
 
     Args:
         p: Record of the tyre.
