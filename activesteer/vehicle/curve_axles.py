@@ -355,8 +355,7 @@ _HEAD: Final = fb.CURVE_TABLE.itemsize // 8
 
 @inlined
 def _place(table, position):
-    """Return a position on a spline: its interval, the fraction within it, and the excess in intervals beyond an
-    end."""
+    """Return a position on a spline: interval, fraction within it, and excess in intervals beyond an end."""
     at = (position - table.start_m) * table.per_m
     count = table.intervals
     inside = min(max(at, 0.0), count)
