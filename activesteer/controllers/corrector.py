@@ -114,7 +114,7 @@ def reset(block: Corrector) -> None:
 
 
 MIN_SPEED_MPS: Final = 3.0
-"""Below this speed active steering is inactive, and the friction limit of the desired yaw rate is constant [m/s]."""
+"""Speed below which active steering is inactive, and the friction limit of the desired yaw rate is constant [m/s]."""
 
 
 class DesiredYawRate(NativeBlock):

@@ -209,7 +209,7 @@ def turned(
 _TIME_CONSTANT_S: Final = 0.5
 """Time constant for a curvature error [s]: slower than the car's response, faster than the rise of the speed."""
 _MIN_SPEED_MPS: Final = 1.0
-"""Below this speed there is no correction: yaw rate over speed is not the curvature of the path [m/s]."""
+"""Speed below which the correction is off: yaw rate over speed is not the curvature of the path there [m/s]."""
 
 
 class ConstantRadiusDriver(NativeBlock):

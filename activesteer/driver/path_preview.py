@@ -38,7 +38,7 @@ PREVIEW_INTERVAL_S: Final = 0.01
 _WINDOW_M: Final = 5.0
 """Largest distance along the path between two looks, with a margin [m]."""
 _MIN_SPEED_MPS: Final = 3.0
-"""Below this speed the driver holds the steering wheel [m/s]."""
+"""Speed below which the driver holds the steering wheel [m/s]."""
 SPEED_STEP_MPS: Final = 0.5
 """Step to which the speed is rounded for the gains [m/s]."""
 N_SPEEDS: Final = 402

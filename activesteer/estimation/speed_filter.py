@@ -46,7 +46,7 @@ _FREE: Final = 0.02
 _MOST_USED: Final = 0.98
 """Fraction of the friction above which the brush model gives no slip."""
 _STANDING_MPS: Final = 0.5
-"""Below this speed, standing wheels mean a standing car [m/s]."""
+"""Speed below which standing wheels mean a standing car [m/s]."""
 _BRAKING_NM: Final = 100.0
 """Total brake torque above which the engine is assumed to give no torque [N m]."""
 

@@ -64,7 +64,7 @@ LEAST_STIFFNESS: Final = 0.3
 LARGEST_STIFFNESS: Final = 2.0
 """Bounds of the estimated stiffness of the tyres relative to new tyres [-]."""
 SLOWEST_MPS: Final = 3.0
-"""Below this speed the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
+"""Speed below which the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
 _LEAST_LEFT: Final = 0.5
 """Smallest fraction of its friction that a wheel keeps for lateral force, for any longitudinal force. By the compact's
 Magic Formula, at 1 to 6 deg, 0.65 to 0.72 of the lateral force remain at a slip of 12 %, where the brake force is

@@ -138,7 +138,7 @@ _END_NAMES: Final = np.array(_ENDS, dtype=object)
 _SIDESLIP_RAD, _RATE_RADPS, _OFFSET_M = math.radians(5.0), math.radians(10.0), 1.0
 """Errors of equal cost."""
 _SLOW_MPS: Final = 2.0
-"""Below this speed there is no sideslip angle, and a drift has ended [m/s]."""
+"""Speed below which there is no sideslip angle, and a drift has ended [m/s]."""
 _MOST_AY_MPS2: Final = 8.0
 """Lateral acceleration up to which the desired yaw rate rises, as for the paper's controllers [m/s2]."""
 SENSORS: Final = ("ideal", "production")

@@ -26,7 +26,7 @@ SIGNS: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
 DriveMode = Literal["hold_speed", "coast"]
 
 MIN_SEARCH_SPEED_MPS: Final = 30.0 / 3.6
-"""Below this speed the lateral acceleration hardly depends on the steering wheel angle [m/s]."""
+"""Speed below which the lateral acceleration hardly depends on the steering wheel angle [m/s]."""
 
 KINDS: Final[dict[str, type[Maneuver]]] = {}
 """Classes by value of `kind` in a file. A class registers itself: `class StepSteer(Maneuver, kind="step_steer")`."""

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 Width = Annotated[float, Range(0.5, 4.0)]
 
 _MIN_SPEED_MPS: Final = 5.0 / 3.6
-"""Below this speed a preview of one or two seconds ends within the car's own length [m/s]."""
+"""Speed below which a preview of one or two seconds ends within the car's own length [m/s]."""
 _AFTER_S: Final = 3.5
 """Time after the last gate in which the car can be seen to settle [s]."""
 

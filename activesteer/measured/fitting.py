@@ -127,13 +127,13 @@ def measured_of(
 STEP: Final = 1e-3
 """Step of the derivatives, relative to the range: far above rounding, far below the curvature of a run."""
 _SETTLED: Final = 1e-4
-"""The search ends when no parameter moves further than this fraction of its range. Gauss-Newton steps shrink
+"""Largest step of a parameter, as a fraction of its range, at which the search ends. Gauss-Newton steps shrink
 quadratically, so the remaining error is far smaller."""
 _LESS: Final = 1e-8
-"""The search also ends when the sum of squares decreases by no more than this fraction."""
+"""Relative decrease of the sum of squares at or below which the search also ends."""
 _MOST_ROUNDS: Final = 40
 AT_END: Final = 1e-3
-"""A parameter this close to an end of its range is at that end."""
+"""Distance from an end of its range, as a fraction of the range, at which a parameter counts as at the end."""
 
 Answer = list[Array] | str
 """Differences of every channel of every recording for a set of parameters, or the reason why it cannot be driven."""

@@ -173,7 +173,7 @@ def use_colours(friction_utilisation: NDArray[np.float64]) -> NDArray[np.uint32]
 
 _GHOST_OPACITY: Final = 0.4
 _GHOST_EVERY: Final = 5
-"""Every fifth pose gets a new opacity, because the opacity changes slowly."""
+"""Number of poses for each new opacity, which changes slowly."""
 _CUTAWAY_OPACITY: Final = 0.25
 """Opacity of a body in a cutaway view."""
 

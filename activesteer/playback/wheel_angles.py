@@ -29,7 +29,7 @@ from activesteer.road.course import Footprint, footprint_of
 PLAN: Final = "plan"
 """Parent entity of the plan."""
 _EVERY: Final = 2
-"""Every second pose is shown: 50 per second."""
+"""Number of poses per shown pose: 50 are shown per second."""
 _ABOVE_ROAD_M: Final = 0.05
 _AHEAD: Final = (245, 245, 245)
 _APART_M: Final = 4.2

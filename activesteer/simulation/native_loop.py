@@ -63,7 +63,7 @@ CAR: Final = np.dtype(
         ],
     )
 )
-"""A car with its loop.
+"""Record of a car with its loop.
 
 `step`, `left`: steps made and steps to make; `stage`, `status`: where it stands and why; `next_change`: step before
 which a fault begins or ends. `bindings`: `Vehicle.address`. `first`, `last`: steps of the first setpoint and behind the

@@ -183,7 +183,7 @@ WHEEL: Final = numbers_type(
     "body", "root", "act_x", "act_y", "act_z", "mu", "pressure_Pa", "low_speed_mps", "low_speed_damping_Nspm",
     "spin_dof", "drive_fraction", "chain_length", ("chain", MAX_CHAIN),
 )  # fmt: skip
-"""A wheel, with the degrees of freedom between the world and it. Its tyre has the same place in its section."""
+"""A wheel, with the degrees of freedom between the world and the wheel. Its tyre has the same place in its section."""
 
 DAMPER: Final = numbers_type(
     "tendon", "row", "length", "points", ("chain", MAX_CHAIN), ("velocity_mps", MAX_CURVE_POINTS),

@@ -60,7 +60,7 @@ _BASE: Final = """
 
 
 class FilmedCar(NamedTuple):
-    """A car in the scene."""
+    """A car in the scene: its parts, bodies, colours and opacity."""
 
     parts: tuple[ScenePart, ...]  # parts of the car
     bodies: tuple[str, ...]  # names of its bodies, in the order of the poses

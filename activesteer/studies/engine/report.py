@@ -33,7 +33,7 @@ from activesteer.studies.engine.tuning import Goal, Trial, Tuning
 _SHOWN_ROWS: Final = 3000
 """Largest number of runs whose points the page holds. Counts and means are over all runs."""
 _FEW: Final = 20
-"""Runs of a controller below which quantiles, ranks and shares say little: the page shows each run instead."""
+"""Number of a controller's runs below which quantiles, ranks and shares say little: the page shows each run instead."""
 _BINS: Final = 40
 _EXTREMES: Final = 5
 _FIRST: Final = (*SIDESLIP_PEAKS, "yaw_rate_peak_radps", "ay_peak_mps2")

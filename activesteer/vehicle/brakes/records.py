@@ -82,7 +82,7 @@ class Antilock:
     """Acceleration that a released wheel must reach [m/s2]. If it does not, as on ice, the pressure is reduced
     further."""
     rolls_fraction: Fraction = 0.5
-    """A released wheel rolls with the car again once its acceleration falls below this fraction of its peak [-]."""
+    """Fraction of its peak acceleration below which a released wheel rolls with the car again [-]."""
     resume_fraction: Fraction = 0.97
     """Pressure of a wheel that rolls again, as a fraction of its friction torque."""
     build_per_s: Positive = 0.5
