@@ -73,7 +73,7 @@ def _places(curves: Mapping[str, str]) -> list[tuple[int, float]]:
 
 _LIMIT: Final = "_saturated"
 _SHORTEST_S: Final = 0.05
-"""Length of the interruptions of a saturation that are ignored [s]."""
+"""Longest interruption of a saturation that is ignored [s]."""
 
 
 class Event(NamedTuple):
