@@ -149,8 +149,8 @@ def _comparison(found: Population) -> list[str]:
     every = found.samples * len(found.vehicle.split(", ")) * (1 + len(names))
     lines = [
         f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
-        f"{found.failed} of {every} runs are left out. Friction does not allow their turn, or the rear screw actuator "
-        "does not fit the rear axle of the car.",
+        f"{found.failed} of {every} runs are left out, because the friction is too low for their turn or because the "
+        "car's rear axle cannot take a screw actuator.",
         "",
         *_head("runs with harm", names),
     ]
@@ -158,15 +158,17 @@ def _comparison(found: Population) -> list[str]:
         own = [effect for effect in found.systems if effect.scenario == scenario]
         lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
     lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
-    lines.append(_row("the same, all stops counted", [str(total.harmed_anywhere) for total in totals]))
+    lines.append(_row("the same, with all stops counted", [str(total.harmed_anywhere) for total in totals]))
     lines.append(_row("pairs of runs", [str(total.harmed.number) for total in totals]))
-    lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
-    lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
+    lines.append(_row("saved, of the cars lost without control", [str(total.saved) for total in totals]))
+    lines.append(
+        _row("lost with the controller, of the cars not lost without control", [str(total.spoiled) for total in totals])
+    )
     lines += ["", *_head("by car", names)]
     for vehicle in dict.fromkeys(effect.vehicle for effect in found.cars):
         own = [effect for effect in found.cars if effect.vehicle == vehicle]
         lines.append(_row(f"**{vehicle}**: runs with harm", [str(effect.harmed) for effect in own]))
-        lines.append(_row("the same, all stops counted", [str(effect.harmed_anywhere) for effect in own]))
+        lines.append(_row("the same, with all stops counted", [str(effect.harmed_anywhere) for effect in own]))
         for text, measures in _WORST.items():
             lines.append(_row(text, [_worst(effect, measures) for effect in own]))
     against = [
@@ -185,10 +187,10 @@ def _comparison(found: Population) -> list[str]:
 
 
 _WORST: Final = {
-    "worst additional deviation, m": ("lane", "path"),
-    "worst stop, m": ("stopping",),
-    "worst stop off the line, m": ("stopping_elsewhere",),
-    "worst heading, deg": ("heading",),
+    "largest additional deviation, m": ("lane", "path"),
+    "largest increase in stopping distance, m": ("stopping",),
+    "the same for cars that leave their line, m": ("stopping_elsewhere",),
+    "largest increase in final heading, deg": ("heading",),
 }
 """Row of the table -> measures of harm. A car off the line leaves its line without control."""
 
