@@ -64,10 +64,10 @@ _HEAD: Final = """# The population
 This page shows how often each [claim](claims.md) holds if car, road, driver, line, gains and sensors vary.
 
 `activesteer study population` drives {samples} variations of the {vehicle} through the paper's five scenarios. Each
-variation drives with all three systems: {runs} runs in total. The package stores the results (`studies/population/`).
+variation drives with all three systems, which gives {runs} runs in total. The package stores the results (`studies/population/`).
 `tools/renew.py population` renews the results and this page.
 
-They were driven with {versions}.
+The variations were driven with {versions}.
 
 ## Varied quantities
 
@@ -82,8 +82,8 @@ driver do not know the varied values.
 
 The 95 % interval (Wilson) of the proportion decides the verdict:
 
-- A claim *holds* if the interval lies above 80 %.
-- A claim *does not hold* if the interval lies below 20 %.
+- A claim *holds* if the interval is above 80 %.
+- A claim *does not hold* if the interval is below 20 %.
 - All other claims *depend* on the variation.
 
 Half of the samples have ideal sensors, and half have the sensors of a production car. The column after the verdict
@@ -92,7 +92,7 @@ gives the proportion with production sensors.
 The last column names the factor that explains most of the verdict, and the fraction of the variance that it explains.
 The fraction comes from a regression on each factor and its square. The cell is empty if no factor is significant.
 
-Claims without a driver are about open-loop manoeuvres, in which the steering wheel follows a table.
+Claims without a driver concern open-loop manoeuvres, where the steering wheel follows a table.
 
 | | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | holds more often with |
 |---|---|---|---|---|---|---|---|---|
@@ -102,10 +102,10 @@ _SYSTEMS: Final = """
 
 A car is *lost* in any of these cases: its sideslip angle exceeds 20 deg (it spins), its body leaves the lanes, or it
 misses a cone of the slalom. A car is *saved* if it is lost without control but not with a system. It is *spoiled* if it
-is lost only with the system. Changes are relative to the same sample without control. They are given as the median and,
-in brackets, the range of 90 % of the samples.
+is lost only with the system. Changes are relative to the same sample without control. They are given as the median, with
+the range of 90 % of the samples in brackets.
 
-| scenario | | lost without | saved | not lost without | spoiled | spin without, with | changes |
+| scenario | system | lost without control | of these, saved | not lost without control | of these, spoiled | spins without, with the system | changes |
 |---|---|---|---|---|---|---|---|
 """
 
