@@ -62,23 +62,13 @@ PRODUCTION: Final = "sensors.preset = production"
 _HEAD: Final = """# The population
 
 This page shows how often each [claim](claims.md) holds if car, road, driver, line, gains and sensors vary.
+[Varied quantities](#varied-quantities) gives the ranges.
 
 `activesteer study population` drives {samples} variations of the {vehicle} through the paper's five scenarios. Each
-variation drives with all three systems, which gives {runs} runs in total. The package stores the results (`studies/population/`).
-`tools/renew.py population` renews the results and this page.
+variation is driven without control, with `ars` and with `afs`, which gives {runs} runs in total. The package stores the results
+(`studies/population/`). `tools/renew.py population` renews the results and this page.
 
-The variations were driven with {versions}.
-
-## Varied quantities
-
-The samples are a Sobol' sequence over the ranges below. The three systems drive the same samples. Controllers and
-driver do not know the varied values.
-
-```toml
-{factors}
-```
-
-## Proportion in which each claim holds
+## Proportion of samples in which each claim holds
 
 The 95 % interval (Wilson) of the proportion decides the verdict:
 
@@ -102,11 +92,24 @@ _SYSTEMS: Final = """
 
 A car is *lost* in any of these cases: its sideslip angle exceeds 20 deg (it spins), its body leaves the lanes, or it
 misses a cone of the slalom. A car is *saved* if it is lost without control but not with a system. It is *spoiled* if it
-is lost only with the system. Changes are relative to the same sample without control. They are given as the median, with
-the range of 90 % of the samples in brackets.
+is lost only with the system. *Spins* gives the numbers of cars that spin without and with the system. Changes are
+relative to the same sample without control. They are given as the median, with the range of 90 % of the samples in
+brackets.
 
-| scenario | system | lost without control | of these, saved | not lost without control | of these, spoiled | spins without, with the system | changes |
+| scenario | system | lost without it | of these, saved | not lost without it | of these, spoiled | spins | changes |
 |---|---|---|---|---|---|---|---|
+"""
+_FACTORS: Final = """
+## Varied quantities
+
+The samples are a Sobol' sequence over the ranges below. The runs without control, with `ars` and with `afs` use the
+same samples. Controllers and driver do not know the varied values.
+
+```toml
+{factors}
+```
+
+The variations were driven with {versions}.
 """
 
 
@@ -122,11 +125,10 @@ def page(found: Population) -> str:
     """Return the page of a population."""
     lines = find_study(STUDY).read_text(encoding="utf-8").splitlines()
     factors = "\n".join(lines[lines.index("[factors]") : lines.index("[design]") - 1])
-    head = _HEAD.format(
-        samples=found.samples, seed=found.seed, vehicle=found.vehicle, runs=15 * found.samples, factors=factors,
-        versions=", ".join(f"{name} {version}" for name, version in found.versions.items()),
-    )  # fmt: skip
-    return head + "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
+    head = _HEAD.format(samples=found.samples, vehicle=found.vehicle, runs=15 * found.samples)
+    versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
+    results = "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
+    return head + results + _FACTORS.format(factors=factors, versions=versions)
 
 
 def comparison_page(text: str, found: Population | None) -> str:
