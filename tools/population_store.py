@@ -65,8 +65,8 @@ This page shows how often each [claim](claims.md) holds if car, road, driver, li
 [Varied quantities](#varied-quantities) gives the ranges.
 
 `activesteer study population` drives {samples} variations of the {vehicle} through the paper's five scenarios. Each
-variation is driven without control, with `ars` and with `afs`, which gives {runs} runs in total. The package stores the results
-(`studies/population/`). `tools/renew.py population` renews the results and this page.
+variation is driven without control, with `ars` and with `afs`, which gives {runs} runs in total. The package stores the
+results (`studies/population/`). `tools/renew.py population` renews the results and this page.
 
 ## Proportion of samples in which each claim holds
 
