@@ -151,8 +151,8 @@ def _comparison(found: Population) -> list[str]:
     every = found.samples * len(found.vehicle.split(", ")) * (1 + len(names))
     lines = [
         f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
-        f"{found.failed} of {every} runs are left out, because the friction is too low for their turn or because the "
-        "car's rear axle cannot take a screw actuator.",
+        f"{found.failed} of {every} runs are left out. Either the friction is too low for their turn, or the car's "
+        "rear axle cannot take a screw actuator.",
         "",
         *_head("runs with harm", names),
     ]
