@@ -62,28 +62,18 @@ PRODUCTION: Final = "sensors.preset = production"
 _HEAD: Final = """# The population
 
 This page shows how often each [claim](claims.md) holds if car, road, driver, line, gains and sensors vary.
+[Varied quantities](#varied-quantities) gives the ranges.
 
 `activesteer study population` drives {samples} variations of the {vehicle} through the paper's five scenarios. Each
-variation drives with all three systems: {runs} runs in total. The package stores the results (`studies/population/`).
-`tools/renew.py population` renews the results and this page.
+variation is driven without control, with `ars` and with `afs`, which gives {runs} runs in total. The package stores the
+results (`studies/population/`). `tools/renew.py population` renews the results and this page.
 
-They were driven with {versions}.
-
-## Varied quantities
-
-The samples are a Sobol' sequence over the ranges below. The three systems drive the same samples. Controllers and
-driver do not know the varied values.
-
-```toml
-{factors}
-```
-
-## Proportion in which each claim holds
+## Proportion of samples in which each claim holds
 
 The 95 % interval (Wilson) of the proportion decides the verdict:
 
-- A claim *holds* if the interval lies above 80 %.
-- A claim *does not hold* if the interval lies below 20 %.
+- A claim *holds* if the interval is above 80 %.
+- A claim *does not hold* if the interval is below 20 %.
 - All other claims *depend* on the variation.
 
 Half of the samples have ideal sensors, and half have the sensors of a production car. The column after the verdict
@@ -92,7 +82,7 @@ gives the proportion with production sensors.
 The last column names the factor that explains most of the verdict, and the fraction of the variance that it explains.
 The fraction comes from a regression on each factor and its square. The cell is empty if no factor is significant.
 
-Claims without a driver are about open-loop manoeuvres, in which the steering wheel follows a table.
+Claims without a driver concern open-loop manoeuvres, where the steering wheel follows a table.
 
 | | claim | driver | nominal | holds in | 95 % interval | verdict | with production sensors | holds more often with |
 |---|---|---|---|---|---|---|---|---|
@@ -102,11 +92,24 @@ _SYSTEMS: Final = """
 
 A car is *lost* in any of these cases: its sideslip angle exceeds 20 deg (it spins), its body leaves the lanes, or it
 misses a cone of the slalom. A car is *saved* if it is lost without control but not with a system. It is *spoiled* if it
-is lost only with the system. Changes are relative to the same sample without control. They are given as the median and,
-in brackets, the range of 90 % of the samples.
+is lost only with the system. *Spins* gives the numbers of cars that spin without and with the system. Changes are
+relative to the same sample without control. They are given as the median, with the range of 90 % of the samples in
+brackets.
 
-| scenario | | lost without | saved | not lost without | spoiled | spin without, with | changes |
+| scenario | system | lost without it | of these, saved | not lost without it | of these, spoiled | spins | changes |
 |---|---|---|---|---|---|---|---|
+"""
+_FACTORS: Final = """
+## Varied quantities
+
+The samples are a Sobol' sequence over the ranges below. The runs without control, with `ars` and with `afs` use the
+same samples. Controllers and driver do not know the varied values.
+
+```toml
+{factors}
+```
+
+The variations were driven with {versions}.
 """
 
 
@@ -122,11 +125,10 @@ def page(found: Population) -> str:
     """Return the page of a population."""
     lines = find_study(STUDY).read_text(encoding="utf-8").splitlines()
     factors = "\n".join(lines[lines.index("[factors]") : lines.index("[design]") - 1])
-    head = _HEAD.format(
-        samples=found.samples, seed=found.seed, vehicle=found.vehicle, runs=15 * found.samples, factors=factors,
-        versions=", ".join(f"{name} {version}" for name, version in found.versions.items()),
-    )  # fmt: skip
-    return head + "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
+    head = _HEAD.format(samples=found.samples, vehicle=found.vehicle, runs=15 * found.samples)
+    versions = ", ".join(f"{name} {version}" for name, version in found.versions.items())
+    results = "\n".join(_claims(found)) + "\n" + _SYSTEMS + "\n".join(_systems(found)) + "\n"
+    return head + results + _FACTORS.format(factors=factors, versions=versions)
 
 
 def comparison_page(text: str, found: Population | None) -> str:
@@ -149,8 +151,8 @@ def _comparison(found: Population) -> list[str]:
     every = found.samples * len(found.vehicle.split(", ")) * (1 + len(names))
     lines = [
         f"{found.samples} samples on each of {found.vehicle}; seed {found.seed}; driven with {versions}.",
-        f"{found.failed} of {every} runs are left out. Friction does not allow their turn, or the rear screw actuator "
-        "does not fit the rear axle of the car.",
+        f"{found.failed} of {every} runs are left out. Either the friction is too low for their turn, or the car's "
+        "rear axle cannot take a screw actuator.",
         "",
         *_head("runs with harm", names),
     ]
@@ -158,15 +160,17 @@ def _comparison(found: Population) -> list[str]:
         own = [effect for effect in found.systems if effect.scenario == scenario]
         lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
     lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
-    lines.append(_row("the same, all stops counted", [str(total.harmed_anywhere) for total in totals]))
+    lines.append(_row("the same, with all stops counted", [str(total.harmed_anywhere) for total in totals]))
     lines.append(_row("pairs of runs", [str(total.harmed.number) for total in totals]))
-    lines.append(_row("lost without control, saved", [str(total.saved) for total in totals]))
-    lines.append(_row("not lost without control, spoiled", [str(total.spoiled) for total in totals]))
+    lines.append(_row("saved, of the cars lost without control", [str(total.saved) for total in totals]))
+    lines.append(
+        _row("lost with the controller, of the cars not lost without control", [str(total.spoiled) for total in totals])
+    )
     lines += ["", *_head("by car", names)]
     for vehicle in dict.fromkeys(effect.vehicle for effect in found.cars):
         own = [effect for effect in found.cars if effect.vehicle == vehicle]
         lines.append(_row(f"**{vehicle}**: runs with harm", [str(effect.harmed) for effect in own]))
-        lines.append(_row("the same, all stops counted", [str(effect.harmed_anywhere) for effect in own]))
+        lines.append(_row("the same, with all stops counted", [str(effect.harmed_anywhere) for effect in own]))
         for text, measures in _WORST.items():
             lines.append(_row(text, [_worst(effect, measures) for effect in own]))
     against = [
@@ -185,10 +189,10 @@ def _comparison(found: Population) -> list[str]:
 
 
 _WORST: Final = {
-    "worst additional deviation, m": ("lane", "path"),
-    "worst stop, m": ("stopping",),
-    "worst stop off the line, m": ("stopping_elsewhere",),
-    "worst heading, deg": ("heading",),
+    "largest additional deviation, m": ("lane", "path"),
+    "largest increase in stopping distance, m": ("stopping",),
+    "the same for cars that leave their line, m": ("stopping_elsewhere",),
+    "largest increase in final heading, deg": ("heading",),
 }
 """Row of the table -> measures of harm. A car off the line leaves its line without control."""
 

@@ -68,7 +68,7 @@ def test_the_measured_circle_has_the_same_numbers_on_all_pages() -> None:
         angle_deg = cells(text, f"{head} |")[0].partition(" ")[0]
         assert f"{angle_deg} deg" in about
         assert f"{angle_deg} deg" in README
-    assert f"the probability box of what the data leave open is {cells(text, '**probability box**')[0]} deg" in about
+    assert f"the probability box of the remaining uncertainty is {cells(text, '**probability box**')[0]} deg" in about
 
 
 def test_the_scorecard_in_the_guide_has_the_stored_numbers() -> None:
