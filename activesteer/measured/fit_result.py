@@ -90,7 +90,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
     return [int(place) for place in np.flatnonzero(_effects(slopes) < _TOO_LITTLE)]
 
 
-def told_apart(slopes: Sequence[Array]) -> list[int]:
+def indistinguishable(slopes: Sequence[Array]) -> list[int]:
     """Return the parameters that cannot be told apart, empty if there are none."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:

@@ -18,7 +18,7 @@ from activesteer.config import Range, build, field_in_unit
 from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
 from activesteer.errors import ActiveSteerError, RecordingError, StudyError, nearest_names
-from activesteer.measured.fit_result import Compared, Fit, Parameter, intervals, told_apart, without_effect
+from activesteer.measured.fit_result import Compared, Fit, Parameter, indistinguishable, intervals, without_effect
 from activesteer.measured.signals import at_sensor, by_channel
 from activesteer.recording import Recording
 from activesteer.scenario import FileOrTable, resolve, value_of
@@ -304,7 +304,7 @@ class _Problem:
                 ("factors", keys[place]),
                 "has no effect above the noise on these channels in these recordings; leave it out",
             )
-        if together := told_apart(slopes):
+        if together := indistinguishable(slopes):
             first, *others = same = [keys[place] for place in together]
             raise source.fail(
                 ("factors", first),

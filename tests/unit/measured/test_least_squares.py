@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from activesteer.errors import StudyError
-from activesteer.measured.fit_result import autocorrelation_time, intervals, told_apart, without_effect
+from activesteer.measured.fit_result import autocorrelation_time, indistinguishable, intervals, without_effect
 from activesteer.measured.fitting import search
 from tests.raising import raises
 
@@ -96,8 +96,8 @@ def test_the_correlation_is_that_of_the_normal_equations():
 
 def test_what_cannot_be_told_is_named():
     ramp, wave = np.linspace(0.0, 10.0, 100), np.sin(np.arange(100.0))
-    assert told_apart([np.column_stack([ramp, wave, 2.0 * ramp])]) == [0, 2]
-    assert told_apart([np.column_stack([ramp, wave, 2.0 * ramp + np.cos(np.arange(100.0))])]) == []
+    assert indistinguishable([np.column_stack([ramp, wave, 2.0 * ramp])]) == [0, 2]
+    assert indistinguishable([np.column_stack([ramp, wave, 2.0 * ramp + np.cos(np.arange(100.0))])]) == []
     assert without_effect([np.column_stack([ramp, 0.0 * ramp, 1e-3 * wave])]) == [1, 2]
 
 
