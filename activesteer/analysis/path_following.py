@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from activesteer.analysis.source import RecordingLike, entry, read_course, read_
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.metric_table import CONES_MISSED
 from activesteer.road.course import Course
+
+if TYPE_CHECKING:
+    from activesteer.recording import Recording
 
 AFTER_S: Final = 3.0
 """Time after the last gate in which the car should settle [s]."""
@@ -160,6 +163,12 @@ def _on_path_side(recording: RecordingLike, course: Course, row: Array) -> NDArr
     sides = np.sign(lanes.track_over_x(recording, row[:, 0]) - row[:, 1])
     # A cone that is not reached has side nan, which equals no side.
     return sides == np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
+
+
+def judged_metrics(recording: Recording) -> Mapping[str, float]:
+    """Return the metrics of a run to judge, without the metrics of cones that a person did not reach."""
+    by_hand = entry(recording, "driver", "name") == "by hand"
+    return as_far_as_driven(recording, recording.metrics) if by_hand else recording.metrics
 
 
 def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
