@@ -182,5 +182,6 @@ def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> 
     if reached.all():
         return metrics
     missed = float(np.count_nonzero(~_on_path_side(recording, course, row[reached])))
-    found = {name: value for name, value in metrics.items() if name not in (CONES_MISSED, "cone_distance_mean_m")}
-    return found | ({CONES_MISSED: missed} if missed else {})
+    left_out = ("cone_distance_mean_m", *(() if missed else (CONES_MISSED,)))
+    found = {name: value for name, value in metrics.items() if name not in left_out}
+    return found | {CONES_MISSED: missed} if missed else found

@@ -395,10 +395,10 @@ def changed_parameters(run: ReportedRun) -> str:
 
 
 def metric_rows(group: Group) -> list[list[Text]]:
-    """Return the metrics with units and differences from the first run."""
+    """Return the metrics that at least one run has, with units and differences from the first run."""
     values = [run.metrics for run in group.runs]
     rows = []
-    for name in dict.fromkeys(name for metrics in values for name in metrics):
+    for name in dict.fromkeys(name for metrics in values for name, value in metrics.items() if not math.isnan(value)):
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]

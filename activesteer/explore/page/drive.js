@@ -208,6 +208,7 @@ export class Drive {
 
   going() {
     this.running = this.compared = true;
+    this.scene.moving(true);
     this.again = this.kept = false;
     this.fold();
     this.latencies = [];
@@ -358,7 +359,7 @@ export class Drive {
     if (!this.frames) { this.say(told, true); return; } // a drive of the page before it was loaded again
     this.running = false;
     this.fold();
-    if (!this.again) $("waiting").hidden = false;
+    if (!this.again) { $("waiting").hidden = false; this.scene.moving(false); }
     this.sent.clear();
     this.last = "";
     $("end").hidden = $("again").hidden = true;

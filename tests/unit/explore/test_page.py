@@ -168,6 +168,15 @@ def test_a_drive_that_ends_early_says_how_far_it_came(tmp_path: Path) -> None:
     assert page["result"] == ["No time: ended after 1 of 6 cones, 1\N{NO-BREAK SPACE}cone hit."]
 
 
+def test_a_car_that_stands_is_drawn_with_all_pixels_again(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""globalThis.seen = []; drive.scene.moving = (is) => seen.push(is);
+        {GO} frame(); key("r"); {ENDED} ready(); drive.going(); frame(); $("end").fire("click"); {ENDED}""",
+    )
+    assert page["result"] == [True, True, False]
+
+
 def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     page = driven(
         tmp_path,
