@@ -181,7 +181,7 @@ const hear = {
     state.all = performance.now() - state.asked;
     if (state.failed != null && state.failed !== state.id) { state.failed = null; say(""); } // its cause is gone
     usable(!!header.command);
-    $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${state.a_deg != null && /\d A\b/.test($("title").textContent) ? `; A: steering wheel angle at 0.3 g, ${number(state.a_deg, 1)}\u00a0deg` : ""}`;
+    $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${state.a_deg != null && /\d A\b/.test($("title").textContent) ? `; A: ${number(state.a_deg, 1)}\u00a0deg, steering wheel at 0.3\u00a0g` : ""}`;
     $("command").textContent = header.command;
     $("python").textContent = header.python;
     asking.finished();
