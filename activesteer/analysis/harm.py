@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from activesteer.analysis.path_following import judged_metrics
+from activesteer.analysis.sine_with_dwell import INSTANTS_S, RATIO_LIMITS
 from activesteer.core.metric_table import (
     CONES_HIT,
     CONES_MISSED,
@@ -57,7 +59,17 @@ def is_controlled(metrics: Metrics) -> bool:
     """Return whether no metric shows a loss of control."""
     # Some manoeuvres have no metric that could.
     tells = any(name in metrics for name in (*SIDESLIP_PEAKS, "heading_end_rad"))
-    return not ((tells and has_spun(metrics)) or _leaves_course(metrics))
+    return not ((tells and has_spun(metrics)) or _leaves_course(metrics) or _turns_on(metrics))
+
+
+def _turns_on(metrics: Metrics) -> str:
+    """Say which share of the yaw rate remains after a sine with dwell, or return an empty text within the limits."""
+    said = ""
+    for at_s, limit in zip(INSTANTS_S, RATIO_LIMITS, strict=True):
+        share = metrics.get(f"yaw_rate_after_{1000 * at_s:.0f}ms_share")
+        if share is not None and abs(share) > limit:
+            said = f"{100.0 * abs(share):.0f} % of the yaw rate remains after {at_s:.2f} s"
+    return said
 
 
 def _leaves_course(metrics: Metrics) -> bool:
@@ -69,6 +81,8 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
         yield f"lost: sideslip angle of {math.degrees(peak):.0f} deg" if math.isfinite(peak) else "lost"
+    elif share := _turns_on(metrics):
+        yield f"keeps turning: {share}"
     if STAYS_IN_LANES in metrics and metrics[STAYS_IN_LANES] != 1.0:
         beyond = metrics.get(LANE_OVERSTEP, math.nan)
         yield f"leaves the lane by {beyond:.2f} m" if beyond > 0.0 else "does not get through the lanes"
@@ -80,7 +94,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 def failures(recording: Recording) -> Iterator[str]:
     """Describe the failures of a run, with the time of its steering actuators at their limits before a spin."""
-    yield from losses(recording.metrics)
+    yield from losses(judged_metrics(recording))
     if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
     sideslip_rad = np.abs(recording["sideslip_rad"])

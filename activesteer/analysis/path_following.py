@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from activesteer.analysis.source import RecordingLike, entry, read_course, read_
 from activesteer.core.conventions import CORNERS, Array
 from activesteer.core.metric_table import CONES_MISSED
 from activesteer.road.course import Course
+
+if TYPE_CHECKING:
+    from activesteer.recording import Recording
 
 AFTER_S: Final = 3.0
 """Time after the last gate in which the car should settle [s]."""
@@ -162,6 +165,12 @@ def _on_path_side(recording: RecordingLike, course: Course, row: Array) -> NDArr
     return sides == np.sign(np.interp(row[:, 0], course.path.x_m, course.path.y_m) - row[:, 1])
 
 
+def judged_metrics(recording: Recording) -> Mapping[str, float]:
+    """Return the metrics of a run to judge, without the metrics of cones that a person did not reach."""
+    by_hand = entry(recording, "driver", "name") == "by hand"
+    return as_far_as_driven(recording, recording.metrics) if by_hand else recording.metrics
+
+
 def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> Mapping[str, float]:
     """Return the metrics of a slalom that may have ended early, without the metrics of cones that were not reached."""
     # Cones passed on the wrong side still count. Without any, nothing says that the car passed all of them.
@@ -173,5 +182,6 @@ def as_far_as_driven(recording: RecordingLike, metrics: Mapping[str, float]) -> 
     if reached.all():
         return metrics
     missed = float(np.count_nonzero(~_on_path_side(recording, course, row[reached])))
-    found = {name: value for name, value in metrics.items() if name not in (CONES_MISSED, "cone_distance_mean_m")}
-    return found | ({CONES_MISSED: missed} if missed else {})
+    left_out = ("cone_distance_mean_m", *(() if missed else (CONES_MISSED,)))
+    found = {name: value for name, value in metrics.items() if name not in left_out}
+    return found | {CONES_MISSED: missed} if missed else found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import webbrowser
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -210,7 +211,8 @@ def _print_table(recordings: Mapping[str, Any], *, every: bool) -> None:
     from activesteer.analysis.tables import comparison
 
     metrics = {label: recording.metrics for label, recording in recordings.items()}
-    names = KEY_METRICS[evaluated_kind(next(iter(recordings.values())))]
+    known = {name for found in metrics.values() for name, value in found.items() if not math.isnan(value)}
+    names = [name for name in KEY_METRICS[evaluated_kind(next(iter(recordings.values())))] if name in known]
     chosen = {run: {name: found[name] for name in names if name in found} for run, found in metrics.items()}
     print(comparison(metrics if every else chosen, partial(_paint, metrics)))
     _print_outcomes(recordings)

@@ -34,6 +34,7 @@ _CORNERS: Final = ("fl", "fr", "rl", "rr")
 )  # fmt: skip
 def _info(options: argparse.Namespace) -> None:
     from activesteer.analysis.harm import failures, kept
+    from activesteer.analysis.path_following import judged_metrics
     from activesteer.analysis.tables import comparison
     from activesteer.recording import Recording
     from activesteer.recording.contents import events_of
@@ -73,7 +74,7 @@ def _info(options: argparse.Namespace) -> None:
         print(terminal.entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}"))
     if not metadata.get("complete", True):
         print(terminal.entry("INCOMPLETE: ", str(metadata.get("error", "the run did not end properly"))))
-    if result := [*failures(recording), *kept(recording.metrics)]:
+    if result := [*failures(recording), *kept(judged_metrics(recording))]:
         print(terminal.entry("result: ", ", ".join(result)))
     if recording.metrics:
         print(comparison({"metrics": recording.metrics}))

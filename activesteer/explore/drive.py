@@ -317,16 +317,19 @@ class DriveSession:
         if self._missed:
             return ", ".join(filter(None, ("no time: a gate was missed", cones)))
         if self._last_lap_s is None:
-            course = self._simulation.scenario.maneuver.course
-            early = ""
-            if course is not None and course.last_gate_x_m is not None:
-                row = course.row_m()
-                count = int(np.sum(row[:, 0] <= self._front_x_m))
-                ended = f"ended after {count} of {len(row)} cones"
-                early = f"no time: {'the last gate was not passed' if count == len(row) else ended}"
-            return ", ".join(filter(None, (early, cones)))
+            early = self._early()
+            return ", ".join(filter(None, (f"no time: {early}" if early else "", cones)))
         word = "last lap" if self._course.radius_m else "time"
         return ", ".join(filter(None, (f"{word} {self._last_lap_s + penalty_s:.2f} s", cones)))
+
+    def _early(self) -> str:
+        """Describe how far a drive came that did not pass the last gate. Return an empty text without gates."""
+        course = self._simulation.scenario.maneuver.course
+        if self._last_lap_s is not None or course is None or course.last_gate_x_m is None:
+            return ""
+        row = course.row_m()
+        count = int(np.sum(row[:, 0] <= self._front_x_m))
+        return "the last gate was not passed" if count == len(row) else f"ended after {count} of {len(row)} cones"
 
     def end(self) -> Reply:
         """Complete the recording of a drive."""
@@ -347,5 +350,6 @@ class DriveSession:
             {
                 "kind": "driven", "file": self.path.name, "folder": str(self.path.parent), "error": problem,
                 "time_s": simulation.time_s, "behind_s": self._pacer.lost_s, "longest_ms": 1e3 * self._longest_s,
+                "early": self._early(),
             }
         )  # fmt: skip

@@ -263,6 +263,7 @@ class Runs:
             look = looks[name]
             run = {"kind": "run", "name": name, "place": look.place, "dashes": look.dashes, "mu": mu}
             run |= {"title": (scenario.maneuver.title or choice.maneuver) + held, "note": note}
+            run["a_deg"] = _a_deg(scenario)
             try:
                 controller = controller_spec(self.folder.located(name))
                 recording = self._driven(scenario, controller, stale)
@@ -377,6 +378,13 @@ class Runs:
         names = json.dumps(list(driven))
         python = f"runs = [activesteer.simulate({json.dumps(choice.maneuver)}, name{more}) for name in {names}]"
         return {"command": shlex.join(words), "python": python}
+
+
+def _a_deg(scenario: Scenario) -> float | None:
+    """Return A, the steering wheel angle at 0.3 g [deg], if the amplitude is a multiple of A."""
+    steer: Any = getattr(scenario.maneuver, "steer", None)
+    factor, angle_rad = (getattr(steer, name, None) for name in ("amplitude_factor", "steering_wheel_rad"))
+    return math.degrees(angle_rad) / factor if factor and angle_rad is not None else None
 
 
 _SEARCHED: Final = {"steer": "steering_wheel", "turn": "steering_wheel", "": "reference_angle"}

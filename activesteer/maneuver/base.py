@@ -19,7 +19,9 @@ from activesteer.road.course import Course
 from activesteer.road.crg import packed, referenced
 from activesteer.road.road import Road
 
-Speed = Annotated[float, Range(-20.0, 100.0)]
+MAX_SPEED_MPS: Final = 100.0
+"""Largest speed of a manoeuvre [m/s]."""
+Speed = Annotated[float, Range(-20.0, MAX_SPEED_MPS)]
 Side = Literal["left", "right"]
 SIGNS: Final[dict[Side, float]] = {"left": 1.0, "right": -1.0}
 """Sign of y, of steering and of yaw on each side (ISO 8855)."""

@@ -137,6 +137,15 @@ def test_without_webgl_the_page_shows_its_curves(browser: Browser, served: tuple
     page.wait_for_selector(DONE, timeout=LIMIT_MS)
     assert len(page.evaluate(LAST_YAW_RATE)) == 1
     assert "no WebGL" in page.inner_text("main")
+    page.emulate_media(color_scheme="dark")  # the page follows the system until the reader chooses
+    page.wait_for_selector("html.dark")
+    page.emulate_media(color_scheme="light")
+    page.wait_for_selector("html:not(.dark)")
+    page.click("#theme")
+    page.emulate_media(color_scheme="dark")
+    page.emulate_media(color_scheme="light")
+    page.wait_for_timeout(200)
+    assert page.locator("html.dark").count() == 1
     page.close()
 
 

@@ -158,6 +158,8 @@ def check(page: Shown) -> None:
         assert size >= 10.99, text
     for ink, paper, text in page.evaluate(TEXT_COLOURS):
         assert contrast(ink, paper) >= 4.5, text
+    cut = "(rows) => rows.filter((row) => row.scrollWidth > row.clientWidth).map((row) => row.textContent)"
+    assert page.locator(".cards tr").evaluate_all(cut) == []
     for box in (box for canvas in page.locator("figure canvas").all() if (box := canvas.bounding_box())):
         assert box["x"] >= 0.0
         assert box["x"] + box["width"] <= width

@@ -193,9 +193,7 @@ def test_nothing_lies_over_anything_else(open_page):
     for device in (DESK, PHONE):
         page = open_page(**device)
         boxes = [
-            box
-            for part in page.locator("figure, .results, .verdicts, .metrics, h1, h2, h3").all()
-            if (box := part.bounding_box())
+            box for part in page.locator("figure, .results, .metrics, h1, h2, h3").all() if (box := part.bounding_box())
         ]
         boxes.sort(key=lambda box: box["y"])
         for place, box in enumerate(boxes):

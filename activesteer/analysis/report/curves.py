@@ -11,6 +11,7 @@ import numpy as np
 
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
 from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun
+from activesteer.analysis.series import changed_friction
 from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
@@ -62,7 +63,13 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
         "start_s": float(grid[0]),
         "samples": len(grid),
         "runs": [
-            {"name": run.name, "label": run.look.label, "place": run.look.place, "dashes": run.look.dashes}
+            {
+                "name": run.name,
+                "label": run.look.label,
+                "place": run.look.place,
+                "dashes": run.look.dashes,
+                "patches_s": changed_friction(run.recording)[0],
+            }
             for run in group.runs
         ],
         "panels": panels,

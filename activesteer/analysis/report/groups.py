@@ -18,7 +18,7 @@ from activesteer.analysis.claims.scorecard import (
     setting_of,
 )
 from activesteer.analysis.harm import failures, kept
-from activesteer.analysis.path_following import as_far_as_driven
+from activesteer.analysis.path_following import as_far_as_driven, judged_metrics
 from activesteer.analysis.source import entry
 from activesteer.analysis.step_response import without_response
 from activesteer.core.conventions import SYSTEM_LABELS, RunLook, run_looks
@@ -150,7 +150,7 @@ _ALSO: Final = ("yaw_rate_steady_state_radps", "stopping_distance_m", "steering_
 
 def outcome(recording: Recording) -> str:
     """Describe failures, met requirements and key figures of a run, in the words of the report."""
-    metadata, metrics = recording.metadata, recording.metrics
+    metadata, metrics = recording.metadata, judged_metrics(recording)
     if not metadata.get("complete", True):
         return f"the run did not end properly: {metadata.get('error', 'no reason is recorded')}"
     said = [*failures(recording), *kept(metrics)]

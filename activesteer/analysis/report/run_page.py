@@ -83,7 +83,10 @@ def report_page(recordings: Mapping[str, Recording], made: date | None = None) -
             Markup('<b class="{}">{} {} {}</b>').format(*_VERDICT_LOOK[verdict], count, verdict.value)
             for verdict, count in everything.counts.items()
         ]
-        lead.append(Markup("Of {} claims of the paper: {}.").format(len(everything.judged), Markup(", ").join(counts)))
+        judged = ((anchor, card.judged) for anchor, card in zip(anchors, cards, strict=True))
+        place = next((anchor, items[0].claim.id) for anchor, items in judged if items)
+        words = Markup('Of {} <a href="#{}-{}">claims of the paper:</a> {}.')
+        lead.append(words.format(len(everything.judged), *place, Markup(", ").join(counts)))
     sections = [_contents(anchors, cards)] if several else []
     for (anchor, group), card in zip(anchors.items(), cards, strict=True):
         sections += _sections(group, anchor, card, group.title if several else "")
@@ -168,17 +171,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     marked = any(figure["change"] is not Change.OTHER for each in found for figure in each["figures"])
     heads = ["Run", *(["Result"] if judged else []), *titles]
     compared = Table("", heads, rows, kind="results", numbers=len(titles), note=note if marked else "")
-    verdicts = [
-        _chip(item, anchor)
-        + Markup(' {} <b class="{}">{}</b>').format(
-            item.claim.text, _VERDICT_LOOK[item.verdict][0], item.verdict.value
-        )
-        for item in card.judged
-    ]  # fmt: skip
-    first = Section(
-        title, told_first, [compared] if len(heads) > 1 else [], verdicts, kind="verdicts",
-        anchor=anchor,
-    )  # fmt: skip
+    first = Section(title, told_first, [compared] if len(heads) > 1 else [], anchor=anchor)
     details = [_claim(item, anchor) for item in card.judged]
     claims = Section("What the paper claims", points=details, level=3, kind="claims")
     told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
@@ -402,10 +395,10 @@ def changed_parameters(run: ReportedRun) -> str:
 
 
 def metric_rows(group: Group) -> list[list[Text]]:
-    """Return the metrics with units and differences from the first run."""
+    """Return the metrics that at least one run has, with units and differences from the first run."""
     values = [run.metrics for run in group.runs]
     rows = []
-    for name in dict.fromkeys(name for metrics in values for name in metrics):
+    for name in dict.fromkeys(name for metrics in values for name, value in metrics.items() if not math.isnan(value)):
         metric = recorded_metric(name)
         first, *others = (metrics.get(name, math.nan) for metrics in values)
         texts = [shown(name, run, number(name, run.get(name, math.nan))) for run in values]

@@ -208,6 +208,7 @@ export class Drive {
 
   going() {
     this.running = this.compared = true;
+    this.scene.moving(true);
     this.again = this.kept = false;
     this.fold();
     this.latencies = [];
@@ -358,16 +359,16 @@ export class Drive {
     if (!this.frames) { this.say(told, true); return; } // a drive of the page before it was loaded again
     this.running = false;
     this.fold();
-    if (!this.again) $("waiting").hidden = false;
+    if (!this.again) { $("waiting").hidden = false; this.scene.moving(false); }
     this.sent.clear();
     this.last = "";
     $("end").hidden = $("again").hidden = true;
     const same = this.compared && String(this.address) === this.setting, before = same ? this.ghost?.lap_s : null, lap = this.lap_s;
     if (same && this.frames.length && (lap || !before)) this.ghosts.set(this.setting, { frames: this.frames, lap_s: lap });
     const faster = lap && before ? `, ${number(Math.abs(lap - before), 2)}\u00a0s ${lap < before ? "faster" : "slower"} than the ghost` : "";
-    const count = ["no cone", "1 cone"][this.struck] ?? `${this.struck} cones`;
+    const count = ["no\u00a0cone", "1\u00a0cone"][this.struck] ?? `${this.struck}\u00a0cones`;
     const cones = !this.scene.cones.length ? "" : !lap || !this.struck ? `, ${count} hit` : `, with ${number(this.penalty_s, 0)}\u00a0s for ${count}`;
-    const timed = lap ? `${this.way}: ${number(lap, 2)}\u00a0s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: the last gate was not passed${cones}. ` : "";
+    const timed = lap ? `${this.way}: ${number(lap, 2)}\u00a0s${cones}${faster}. ` : this.missed ? `No time: a gate was missed${cones}. ` : this.rounds ? "No complete lap. " : this.timed ? `No time: ${header.early}${cones}. ` : "";
     const sorted = [...this.latencies].sort((a, b) => a - b), middle = sorted[Math.floor(sorted.length / 2)];
     const latency = middle == null ? "" : ` Input to picture: ${Math.round(middle)}\u00a0ms.`;
     const earlier = this.earlier;

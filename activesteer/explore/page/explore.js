@@ -181,7 +181,7 @@ const hear = {
     state.all = performance.now() - state.asked;
     if (state.failed != null && state.failed !== state.id) { state.failed = null; say(""); } // its cause is gone
     usable(!!header.command);
-    $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${/\d A\b/.test($("title").textContent) ? "; A: steering wheel angle at 0.3 g" : ""}`;
+    $("state").textContent = `driven in ${number(state.all / 1000, 1)} s${state.a_deg != null && /\d A\b/.test($("title").textContent) ? `; A: ${number(state.a_deg, 1)}\u00a0deg, steering wheel at 0.3\u00a0g` : ""}`;
     $("command").textContent = header.command;
     $("python").textContent = header.python;
     asking.finished();
@@ -213,6 +213,7 @@ function showComing() {
   if (!state.coming.length) return;
   for (const [header, arrays] of state.coming.splice(0)) {
     showTitle(header.title);
+    state.a_deg = header.a_deg;
     if (header.ground_m != null) scene.setSurface(arrays.slice(1), header.ground_m);
     state.runs.set(header.name, { ...header, place: placeOf(header), poses: arrays[0] });
   }

@@ -15,13 +15,20 @@ export const runColour = (place) => (dark() ? data.dark : data.light)[place];
 // How slippery a road looks: 0 for dry asphalt to 1 for packed snow.
 export const slippery = (mu) => Math.min(1, Math.max(0, (0.9 - mu) / 0.6));
 
-export function setTheme(isDark) {
+function show(isDark) {
   root.classList.toggle("dark", isDark);
-  store?.setItem("dark", isDark);
   for (const watcher of watchers) watcher();
 }
 
-setTheme(JSON.parse(store?.getItem("dark") ?? "null") ?? matchMedia("(prefers-color-scheme: dark)").matches);
+export function setTheme(isDark) {
+  store?.setItem("dark", isDark);
+  show(isDark);
+}
+
+// The colours follow the system until the reader has chosen.
+const systemDark = matchMedia("(prefers-color-scheme: dark)"), chosenDark = () => JSON.parse(store?.getItem("dark") ?? "null");
+systemDark.addEventListener("change", () => { if (chosenDark() == null) show(systemDark.matches); });
+show(chosenDark() ?? systemDark.matches);
 
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);

@@ -36,7 +36,8 @@ export class Scene {
   constructor(canvas) {
     this.canvas = canvas;
     this.renderer = rendererOn(canvas);
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.full = this.light = Math.min(devicePixelRatio, 2); // pixel ratios at rest and in motion
+    this.renderer.setPixelRatio(this.full);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(48, 1.6, 0.3, 900);
     this.camera.up.set(0, 0, 1);
@@ -110,7 +111,13 @@ export class Scene {
     const ratio = this.renderer.getPixelRatio();
     if (this.frame_ms < SLOW_MS || ratio <= LEAST_RATIO) return;
     this.frame_ms = 16;
-    this.renderer.setPixelRatio(Math.max(LEAST_RATIO, 0.6 * ratio));
+    this.light = Math.max(LEAST_RATIO, 0.6 * ratio);
+    this.moving(true);
+  }
+
+  // Draw as many pixels as the machine can while the car drives, and all of them while it stands.
+  moving(is) {
+    this.renderer.setPixelRatio(is ? this.light : this.full);
     this.fit();
   }
 

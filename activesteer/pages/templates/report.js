@@ -86,7 +86,7 @@
         axes: [axis(26, " s"), { ...axis(50), space: sideRoom }],
         series: [{}, ...lines],
         hooks: {
-          drawAxes: shaded ? [(u) => this.shade(u)] : [], draw: [(u) => this.marks(u)],
+          drawAxes: [(u) => this.patches(u), ...(shaded ? [(u) => this.shade(u)] : [])], draw: [(u) => this.marks(u)],
           setScale: [(u, key) => { if (key === "x" && u === this.plots[0]) this.limit(u.scales.x); }],
           setCursor: [(u) => this.read(u, panel, values)],
         },
@@ -118,6 +118,15 @@
       });
       const most = `eyond ${limit.toFixed(1)} deg${beyond.length ? ":" : ","} more slip gives the rear tyres less side force.`;
       return beyond.length ? `Shaded, b${most} Rear axle beyond it: ${beyond.join(", ")}.` : `B${most} ${several ? "All rear axles stay" : "The rear axle stays"} below.`;
+    }
+
+    // Shade the times when a wheel of a run is on another friction than at the start: the darker, the more runs.
+    patches(u) {
+      const { ctx, bbox } = u, inside = (time) => Math.min(Math.max(u.valToPos(time, "x", true), bbox.left), bbox.left + bbox.width);
+      ctx.save();
+      ctx.fillStyle = paint.patch; ctx.globalAlpha = 1 / this.data.runs.length;
+      for (const { patches_s } of this.data.runs) for (const [from, to] of patches_s) ctx.fillRect(inside(from), bbox.top, inside(to) - inside(from), bbox.height);
+      ctx.restore();
     }
 
     shade(u) {

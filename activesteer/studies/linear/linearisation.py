@@ -38,6 +38,7 @@ from activesteer.core.signals import ActuatorCommand, DriverCommand
 from activesteer.core.text_table import text_table
 from activesteer.core.units import quantity_of
 from activesteer.errors import ModelError, ParameterError
+from activesteer.maneuver.base import MAX_SPEED_MPS
 from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, check_parts, resolve
@@ -292,12 +293,13 @@ def linear_car(
 ) -> LinearCar:
     """Return the car with all modes, before reduction."""
     speed_mps = float(speed_mps)
-    if not MIN_SPEED_MPS <= speed_mps < math.inf:
+    if not MIN_SPEED_MPS <= speed_mps <= MAX_SPEED_MPS:
         raise ParameterError(
-            f"is {speed_mps:g} m/s; at least {MIN_SPEED_MPS:g} m/s ({3.6 * MIN_SPEED_MPS:g} km/h) is needed",
+            f"is {speed_mps:g} m/s ({3.6 * speed_mps:g} km/h); allowed: {MIN_SPEED_MPS:g} to {MAX_SPEED_MPS:g} m/s "
+            f"({3.6 * MIN_SPEED_MPS:g} to {3.6 * MAX_SPEED_MPS:g} km/h)",
             key="speed_mps",
             value=speed_mps,
-            allowed=Range(MIN_SPEED_MPS),
+            allowed=Range(MIN_SPEED_MPS, MAX_SPEED_MPS),
         )
     sliding = {**(overrides or {}), "vehicle.friction.rack_N": 0.0}
     settling = straight_on(speed_mps) | {"settle_s": _SETTLE_S}

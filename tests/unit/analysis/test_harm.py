@@ -58,6 +58,15 @@ def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
     assert harms(changes(LANE | {key: value}, LANE)) == []
 
 
+EARLY, LATE = "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share"
+DWELL = {EARLY: 0.34, LATE: -0.19, "sideslip_peak_abs_rad": 0.3}
+
+
+def test_a_car_that_keeps_turning_after_a_sine_with_dwell_is_not_controlled():
+    assert is_controlled(DWELL)
+    assert not is_controlled(DWELL | {LATE: -0.21})
+
+
 @pytest.mark.parametrize(
     ("metrics", "lost", "met"),
     [
@@ -68,6 +77,10 @@ def test_each_measure_has_its_size(key: str, value: float, harmed: list[str]):
         ({"cones_hit": 2.0}, ["hits 2 cones"], []),
         ({"cones_missed": 0.0}, [], ["passes all cones"]),
         ({"cones_missed": 1.0, "cones_hit": 0.0}, ["misses 1 cone"], ["hits no cone"]),
+        (DWELL, [], []),
+        (DWELL | {LATE: -0.76}, ["keeps turning: 76 % of the yaw rate remains after 1.75 s"], []),
+        (DWELL | {EARLY: 0.36}, ["keeps turning: 36 % of the yaw rate remains after 1.00 s"], []),
+        (DWELL | {LATE: 0.76, "sideslip_peak_abs_rad": 0.6}, ["lost: sideslip angle of 34 deg"], []),
     ],
 )
 def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], lost: list[str], met: list[str]):

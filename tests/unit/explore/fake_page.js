@@ -36,7 +36,7 @@ export class Socket extends Connection { constructor(heard, lost) { super(heard,
 export function disconnect(reason) { connection.readyState = 3; connection.onclose({ reason }); }
 export class Curves { show() {} at() {} whole() {} besides() {} }
 export class Track { show() {} at() {} }
-export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} mark() {} knock() {} lighten() {} draw() {} follow() {} }
+export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {} setCourse() {} fit() {} tint() {} car() {} place() {} grow() {} mark() {} knock() {} lighten() {} moving() {} draw() {} follow() {} }
 export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
 export class Drive { offer() {} going() {} failed() {} lost() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };

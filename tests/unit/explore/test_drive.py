@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.analysis.report.groups import verdict
 from activesteer.analysis.report.run_page import report_page
 from activesteer.errors import ActiveSteerError, ParameterError
 from activesteer.explore.choice import Folder
@@ -233,10 +234,11 @@ def test_a_drive_past_a_gate_has_no_time(tmp_path: Path) -> None:
 def test_a_drive_that_ends_early_says_how_far_it_came_and_its_report_does_not_judge_the_rest(tmp_path: Path) -> None:
     car = drive("slalom", tmp_path)  # straight on, through the first cone
     go(car, 3.7)
-    car.end()
+    assert car.end().header["early"] == "ended after 1 of 6 cones"  # what the page says
     assert result_of(car) == "no time: ended after 1 of 6 cones, 1 cone hit (+2 s)"
     assert car.path is not None
     recording = activesteer.Recording.open(car.path)
+    assert not any("misses" in words for words in verdict({"a": recording}))
     assert recording.metrics["cones_missed"] > 1.0  # a metric counts what is not reached
     page = report_page({"a.mcap": recording})
     assert "hits 1 cone" in page

@@ -158,6 +158,25 @@ def test_the_last_lap_on_a_circle_stands_behind_the_stroke(tmp_path: Path) -> No
     assert page["result"][4:] == ["time", "time / last lap", "time / ghost", "time / last lap"]
 
 
+def test_a_drive_that_ends_early_says_how_far_it_came(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""{GO} drive.timed = true; drive.struck = 1; drive.scene.cones = [1]; frame({{ last_lap_s: null }});
+        drive.ended({{ time_s: 3, behind_s: 0, file: "a", folder: "/", error: "", early: "ended after 1 of 6 cones" }});
+        globalThis.seen = [$("driven").children[0].words];""",
+    )
+    assert page["result"] == ["No time: ended after 1 of 6 cones, 1\N{NO-BREAK SPACE}cone hit."]
+
+
+def test_a_car_that_stands_is_drawn_with_all_pixels_again(tmp_path: Path) -> None:
+    page = driven(
+        tmp_path,
+        f"""globalThis.seen = []; drive.scene.moving = (is) => seen.push(is);
+        {GO} frame(); key("r"); {ENDED} ready(); drive.going(); frame(); $("end").fire("click"); {ENDED}""",
+    )
+    assert page["result"] == [True, True, False]
+
+
 def test_the_lap_before_a_restart_is_told_at_the_end(tmp_path: Path) -> None:
     page = driven(
         tmp_path,

@@ -109,6 +109,7 @@ def test_a_search_that_fails_keeps_the_amplitude_which_command_and_title_give(
         assert f" {angle:.0f} deg" in kept.header["note"]
     if factor := values.get("steer.amplitude_factor"):  # the slider of the factor still moves the amplitude
         assert f"A, the steering wheel angle at 0.3 g, stays at {angle / factor:.1f} deg" in kept.header["note"]
+        assert held.header["a_deg"] == pytest.approx(angle / factor, rel=1e-5)
         more = {**values, "steer.amplitude_factor": factor + 1.0}
         (run, done) = runs.run(RunRequest(**choice, values=more), lambda: False)
         now = float(done.header["command"].partition(f"{key}=")[2].split()[0])

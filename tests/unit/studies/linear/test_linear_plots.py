@@ -10,10 +10,11 @@ import pytest
 from markupsafe import Markup
 
 from activesteer.analysis.figures import figure_2
+from activesteer.errors import ParameterError
 from activesteer.pages import render_page
 from activesteer.plotting import Panel, draw
 from activesteer.studies.linear.driver_loop import conclusion
-from activesteer.studies.linear.linearisation import bode_picture, modes_page, root_locus_picture
+from activesteer.studies.linear.linearisation import bode_picture, linear_car, modes_page, root_locus_picture
 from activesteer.vehicle.linear_state import Mode
 from tests.unit.analysis.synthetic import step_steer
 
@@ -32,6 +33,12 @@ def system(speed_mps: float = 20.0) -> control.StateSpace:
         a, [[0.0], [81.0]], np.tile([1.0, 0.0], (4, 1)), np.zeros((4, 1)),
         inputs=["steering_wheel_rad"], outputs=list(OUTPUTS), states=names,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("speed_kmh", [5.0, 500.0, math.nan])
+def test_a_speed_out_of_range_is_rejected_in_the_unit_of_the_command(speed_kmh: float):
+    with pytest.raises(ParameterError, match=rf"{speed_kmh:g} km/h\); allowed: .* \(10.8 to 360 km/h\)"):
+        linear_car(speed_mps=speed_kmh / 3.6)
 
 
 def test_bode_diagram_shows_gain_and_phase_of_every_output():
