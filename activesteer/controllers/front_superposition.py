@@ -50,7 +50,7 @@ class FrontSuperposition(NativeBlock):
 def front_superposition(
     block: FrontSuperposition, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `FrontSuperposition.step`, for the first fields of an `ActuatorCommand`."""
+    """Return the first fields of an `ActuatorCommand` by the law of `FrontSuperposition.step`."""
     speed_mps = measurement.speed_mps
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:

@@ -265,7 +265,7 @@ def regulated(
     rear_rad: float,
     pressures_Pa: PerWheel,
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `Lqr.step`, for the first fields of an `ActuatorCommand`."""
+    """Return the first fields of an `ActuatorCommand` by the law of `Lqr.step`."""
     desired, _, _, steady, front_demand, rear_demand, least, most = fed_back(
         block, now, innovation, driver_rad, brake_pedal, superposition_rad, rear_rad, pressures_Pa, NO_BRAKES
     )

@@ -29,7 +29,7 @@ class NoControl(NativeBlock):
 def no_control(
     block: NoControl, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `NoControl.step`, for the first fields of an `ActuatorCommand`."""
+    """Return the first fields of an `ActuatorCommand` by the law of `NoControl.step`."""
     desired = desired_yaw_rate(block._desired, command.front_steer_demand_rad, measurement.speed_mps)
     return 0.0, 0.0, desired, 0.0, 0.0, False
 

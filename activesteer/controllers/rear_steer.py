@@ -104,7 +104,7 @@ class RearSteer(NativeBlock):
 def rear_steer(
     block: RearSteer, command: DriverCommand, measurement: Measurement
 ) -> tuple[float, float, float, float, float, bool]:
-    """Law of `RearSteer.step`, for the first fields of an `ActuatorCommand`."""
+    """Return the first fields of an `ActuatorCommand` by the law of `RearSteer.step`."""
     front_steer_rad, speed_mps = command.front_steer_demand_rad, measurement.speed_mps
     desired = desired_yaw_rate(block._desired, front_steer_rad, speed_mps)
     if speed_mps < MIN_SPEED_MPS:

@@ -51,7 +51,7 @@ def drawn_values(recording: Channels, channel: str) -> Array:
 
 
 class Line(NamedTuple):
-    """A line of a panel."""
+    """Channel, style and views of a line in a panel."""
 
     channel: str
     name: str = ""  # its name where a panel has several lines of a run

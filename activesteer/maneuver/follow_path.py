@@ -190,7 +190,7 @@ class FollowPath(AlongCourse, kind="follow_path"):
         return np.interp(path.s_m, at * (path.length_m / at[-1]), values)
 
     def sequence(self) -> PathSpeed | None:
-        """Return the sequence that follows the speeds along the path, or None without speeds."""
+        """Return the speed sequence along the path, or None if the path has no speeds."""
         path = self.course.path
         speeds_mps = self._along(path, self.path.speed_mps)
         return None if speeds_mps is None else PathSpeed(self, path, speeds_mps)

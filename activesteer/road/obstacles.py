@@ -55,7 +55,7 @@ class Grid(NamedTuple):
 
 
 def summed(fine: Grid, other: Grid) -> Grid:
-    """Return the sum of two grids at the steps of the first, each grid constant beyond its edges."""
+    """Return the sum of two grids, sampled at the steps of the first. Beyond its edges, each grid is constant."""
     first = min(0, round((other.s_m - fine.s_m) / fine.step_s_m))
     last = max(fine.z_m.shape[0], round((other.s[-1] - fine.s_m) / fine.step_s_m) + 1)
     s = fine.s_m + fine.step_s_m * np.arange(first, last)

@@ -70,7 +70,7 @@ class StudyFile(_Common):
     source: Source = Source("study")
 
     def samples(self) -> tuple[Samples, ...]:
-        """Return the combinations, one set for all controllers if paired, else one for each."""
+        """Return the samples: one set that all controllers share if paired, else one set per controller."""
         if self.case_list is not None:
             return (self.case_list,)
         # A grid is the same for all controllers anyway.
