@@ -21,9 +21,6 @@ steered to the turn of new tyres, its rear axle could slide on snow. Therefore, 
 that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle.
 Both axles then turn by the same angle, which leaves the yaw rate as it is.
 
-A car whose rear tyres are worse than those of the file turns less than desired, until its rear axle slides. Therefore
-the superposition into the turn fades while v |r| reaches the acceleration that the known friction allows.
-
 u* are the angles of the turn at the time when the current demand takes effect, a lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
@@ -101,9 +98,6 @@ _SAME_RAD: Final = 1e-6
 """Difference of an angle from its demand that does not count as a limit [rad]."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it, its action fades out until `MIN_SPEED_MPS` [m/s]."""
-_USED_FROM, _USED_TO = 0.95, 1.05
-"""Use of the friction from which the superposition into the turn fades, and at which it is zero [-]. The first values
-that were tried."""
 
 
 class Turn(NamedTuple):
@@ -355,13 +349,6 @@ def fed_back(
     lacking = (desired - now[_YAW_RATE]) / block._lacking_radps
     least *= min(max(1.0 - lacking, 0.0), 1.0)
     most *= min(max(1.0 + lacking, 0.0), 1.0)
-    # While the car turns as hard as the known friction bears, no superposition steers it further into the turn.
-    used = speed * abs(now[_YAW_RATE]) / (block._reference._most_mps2 * friction)
-    further = 1.0 - certain * min(max((used - _USED_FROM) / (_USED_TO - _USED_FROM), 0.0), 1.0)
-    if driver_rad > 0.0:
-        most *= further
-    else:
-        least *= further
     front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
     return desired, sideslip, steady, rear, front_demand, rear_demand, least, most
 

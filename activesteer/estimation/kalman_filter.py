@@ -22,8 +22,8 @@ lateral acceleration is expected from its values at u and at sqrt(3) standard de
     slope = (a+ - a-) / (2 sqrt(3 P)),  mean = a + (a+ + a- - 2 a) / 6,  variance + (a+ + a- - 2 a)^2 / 18
 
 A friction that jumps further than this range would be mistaken for soft tyres or for an offset of the accelerometer all
-the same. Therefore a value with an unexpectedly large error changes no state that cannot jump, and `reopen` makes the
-friction unknown again (see `advance`).
+the same. Therefore a value with an unexpectedly large error changes neither stiffness nor offset, and `reopen` makes
+the friction unknown again (see `advance`).
 
 Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
@@ -74,20 +74,17 @@ from activesteer.native.compilation import compiled, inlined
 
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
-_MOST_PULLED: Final = 0.25
+_MOST_BRAKED: Final = 0.25
 """Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
-the longitudinal force of brakes or motors then reduces them by more than `force_fraction`, by a friction circle that is
-itself not exact. The uncertainty of both still counts. Without it, a car that accelerated on snow with too
-low a friction had errors of eleven standard deviations. They moved its lateral speed by 0.7 m/s in 0.1 s."""
+brakes then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
 _LEAST_SLIP_RAD: Final = math.radians(0.3)
 """Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
 cause slip angles of 0.05 to 0.10 deg RMS (compact, sedan), which the model does not know. This limit is three times as
 large."""
 _SURPRISING: Final = 4.0
-"""Squared error over its expected variance above which a value changes only states that can jump: two standard
-deviations. The tyre forces have then changed. Stiffness, lateral speed, accelerometer offset and inclination of the
-road have not. At the edge of snow, one sample moved the offset by 0.34 m/s2, six of its standard deviations. In a
-slalom on snow, one sample moved the gravity across the road by 0.3 m/s2, and the lateral speed with it."""
+"""Squared error over its expected variance above which a value is not used for the stiffness and for the offset of the
+accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
+offset by 0.34 m/s2, six of its standard deviations. The friction behind the snow was then too low by 0.1."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth of a
 second one axle is still on the old one. Chosen from 0.1, 0.2 and 0.3 by the error of the sideslip angle."""
@@ -127,10 +124,9 @@ def _step_of(state, place):
 
 
 @inlined
-def _is_pulled(known, memory):
-    """Return whether brakes or motors use too much of the front axle's friction to show road and tyres."""
+def _is_braked(known, memory):
     plausible = memory.state[FRICTION] + math.sqrt(memory.covariance[FRICTION, FRICTION])
-    return abs(memory.front_along_N) > 2.0 * _MOST_PULLED * plausible * known.front_load_N
+    return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
 
 
 @inlined
@@ -145,12 +141,12 @@ def _force_errors(known, front_N, rear_N):
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
     """Compute the state after an interval, and its derivatives by the current state."""
     state = memory.state
-    start, other = state.copy(), np.empty(N_STATES)
+    start, other, braked = state.copy(), np.empty(N_STATES), _is_braked(known, memory)
     follow(known, tyres, memory, start, duration_s, moved)
     for column in range(N_STATES):
         slope[:, column] = 0.0
         slope[column, column] = 1.0
-        if column in (RATE_OFFSET, AY_OFFSET):
+        if column in (RATE_OFFSET, AY_OFFSET) or (braked and column >= FRICTION):
             continue
         step = _step_of(state, column)
         start[column] += step
@@ -236,6 +232,12 @@ def predict(known, tyres, memory, duration_s):
             else:
                 total += half[row, column] * slope[column, column]
             covariance[row, column] = covariance[column, row] = total
+    if _is_braked(known, memory):
+        # Road and tyres are not estimated while braking, so they must not follow the other states by old correlations.
+        for place in range(FRICTION, n):
+            variance = covariance[place, place]
+            covariance[place, :] = covariance[:, place] = 0.0
+            covariance[place, place] = variance
 
 
 @inlined
@@ -259,11 +261,11 @@ def _over_friction(known, tyres, memory, here_mps2):
 
 
 @inlined
-def _take_in(state, covariance, row, error, variance, pulled):
+def _take_in(state, covariance, row, error, variance):
     """Process one measured value, and return the expected variance of its error.
 
-    Some states have no gain, and only their uncertainty counts (Schmidt's filter): a stiffness without a slip angle
-    that shows it, states that cannot jump after a surprise, and road and tyres under large longitudinal forces.
+    A stiffness without a slip angle that shows it, or an offset that would have to jump, has no gain; its uncertainty
+    counts (Schmidt's filter).
     """
     n = len(state)
     spread, expected = np.zeros(n), variance
@@ -274,11 +276,9 @@ def _take_in(state, covariance, row, error, variance, pulled):
         expected += row[i] * spread[i]
     surprising = error * error > _SURPRISING * expected
     hidden = np.zeros(n, np.bool_)
-    hidden[LATERAL_SPEED] = hidden[AY_OFFSET] = hidden[BANK] = surprising
+    hidden[AY_OFFSET] = surprising
     hidden[FRONT_STIFFNESS] = surprising or abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD
     hidden[REAR_STIFFNESS] = surprising or abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD
-    if pulled:
-        hidden[FRICTION:] = True
     for i in range(n):
         if not hidden[i]:
             state[i] += spread[i] / expected * error
@@ -299,12 +299,11 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         and the part of the yaw rate, with one.
     """
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
-    pulled = _is_pulled(known, memory)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
     variance = known.rate_variance_rad2ps2 + (known.rate_fraction * yaw_rate_radps) ** 2
     # One value after the other: the first changes the expectation of the second.
-    of_rate = error * error / _take_in(state, covariance, row, error, variance, pulled)
+    of_rate = error * error / _take_in(state, covariance, row, error, variance)
     row[YAW_RATE] = row[RATE_OFFSET] = 0.0
     mass = known.mass_kg
     front_N, rear_N = forces_of(known, tyres, memory, state)
@@ -313,9 +312,13 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         math.cos(memory.front_angle_rad),
         math.cos(memory.rear_angle_rad),
     )
-    here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
-    row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
+    braked, bend_mps2 = _is_braked(known, memory), 0.0
+    if not braked:
+        here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
+        row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
     for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO):
+        if place > FRICTION and braked:
+            continue
         kept, step = state[place], _step_of(state, place)
         state[place] += step
         other_front_N, other_rear_N = forces_of(known, tyres, memory, state)
@@ -329,7 +332,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     variance += bend_mps2 * bend_mps2 / 18.0
-    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance, pulled)
+    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)

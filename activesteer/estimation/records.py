@@ -19,8 +19,7 @@ LATERAL_SPEED, YAW_RATE, FRONT_SLIP, REAR_SLIP, FRONT_ERROR, REAR_ERROR, RATE_OF
     FRICTION, FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO = range(13)  # fmt: skip
 """Indices of the states v_y, r, a_f, a_r, e_f, e_r, b_r, b_y, g_y, u, k_f, k_r, w; see `kalman_filter`."""
 N_STATES: Final = 13
-"""Number of states; those from `FRICTION` on are properties of road and tyres, which are not learned under large
-longitudinal forces."""
+"""Number of states; those from `FRICTION` on are properties of road and tyres, which are not learned while braking."""
 N_MOVING: Final = 4
 """Number of states that depend on others after an interval; the others, behind them, depend only on themselves."""
 SAID: Final = (

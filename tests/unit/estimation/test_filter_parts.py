@@ -321,50 +321,6 @@ def test_lateral_acceleration_shows_the_offset_of_its_own_sensor_unless_it_is_a_
     assert memory.state[RATE_OFFSET] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("error_mps2", "learns"), [(0.1, True), (2.0, False)])
-def test_a_surprising_acceleration_shows_other_forces_and_moves_neither_the_car_nor_the_road(
-    known, memory, setup, error_mps2, learns
-):
-    """In a slalom on snow, one sample tilted the road by 0.3 m/s2, and the lateral speed followed."""
-    tyres, deaf = np.array([tyre.force_N for tyre in setup.estimation.tyres]), known.copy()
-    deaf["rate_variance_rad2ps2"] = 1e12
-    memory["speed_mps"] = 20.0
-    memory["state"][FRICTION], memory["covariance"][FRICTION, FRICTION] = 0.3, 0.02**2
-    memory["state"][[FRONT_SLIP, REAR_SLIP]] = math.radians(2.0)
-    predict(known, tyres, memory, 0.01)  # correlates all states
-    front_N, rear_N = forces_of(known, tyres, memory, memory.state)
-    before = memory.state.copy()
-    correct(deaf, tyres, memory, 0.0, (front_N + rear_N) / known.mass_kg - error_mps2, 0.01)
-    moved = memory.state - before
-    assert (moved[[LATERAL_SPEED, BANK]] != 0.0).tolist() == [learns, learns]
-    assert moved[FRICTION] < 0.0
-    assert (moved[[FRONT_SLIP, REAR_SLIP]] < 0.0).all()
-
-
-def test_under_large_longitudinal_forces_friction_is_not_learned_and_its_uncertainty_counts(known, memory, setup):
-    """A car that pulls on snow, and believes in ice, has an error that is no error of its motion."""
-    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
-    memory["speed_mps"] = 20.0
-    memory["state"][FRICTION] = 0.15
-    memory["state"][[FRONT_SLIP, REAR_SLIP]] = math.radians(4.0)
-    memory["along_N"][:2], memory["front_along_N"] = 800.0, 1600.0
-    predict(known, tyres, memory, 0.01)
-    front_N, rear_N = forces_of(known, tyres, memory, memory.state)
-    before, sure = memory.state.copy(), memory.copy()
-    for place in range(FRICTION, N_STATES):
-        sure["covariance"][place, :] = sure["covariance"][:, place] = 0.0
-        sure["covariance"][place, place] = 1e-8
-    # A tenth more friction than believed.
-    felt_mps2 = (front_N + rear_N) / known.mass_kg + 0.1 * GRAVITY_MPS2
-    (unsure_of_road, _), (sure_of_road, _) = (
-        correct(known, tyres, each, 0.0, felt_mps2, 0.01) for each in (memory, sure)
-    )
-    assert (memory.state[FRICTION:] == before[FRICTION:]).all()
-    assert unsure_of_road < 1.0
-    assert sure_of_road > 4.0
-    assert abs(memory.state[LATERAL_SPEED] - before[LATERAL_SPEED]) < 0.005
-
-
 def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_does_not_feel_it(known, memory, setup):
     tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
     memory["speed_mps"], memory["state"][BANK] = 20.0, 0.5

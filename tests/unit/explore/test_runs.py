@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,7 @@ def test_a_car_that_does_not_follow_a_step_has_no_response_times_and_a_remark(tm
         assert (run.header["remark"] == "") == turns
         page = report_page(runs.driven())
         assert ("does not follow the steering" in page) == (not turns)
-        assert len(re.findall(r"yaw rate overshoot</span>.*?>\N{EN DASH}<", page)) == (not turns)
+        assert ("yaw rate overshoot</span>" in page) == turns  # rows that no run has are left out
 
 
 @pytest.mark.parametrize(
