@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from activesteer import simulate
 from activesteer.analysis.report import open_all, report_page, write_report
 from activesteer.analysis.report.curves import MAX_SAMPLES, plots, time_grid
 from activesteer.analysis.report.groups import MAX_RUNS, Group, groups_of, judge, outcome
@@ -436,6 +437,17 @@ def test_what_is_not_finite_is_left_out():
     assert values[600] is not None
     assert set(values[601:]) == {None}
     assert "peak yaw rate" not in Page(page).words
+
+
+def test_a_run_has_the_times_on_another_friction_for_the_shading_of_its_curves():
+    jump = simulate("mu_jump", "none")
+    (run,) = data_of(report_page({"a.mcap": jump}))[0]["runs"]
+    ((begin_s, end_s),) = run["patches_s"]
+    on = jump.time_s[jump["fr_mu"] < 0.5]
+    assert begin_s == pytest.approx(on[0], abs=1e-3)
+    assert end_s > on[-1]  # the rear wheels leave the patch later
+    (run,) = data_of(report_page({"a.mcap": simulate("step_steer", "none")}))[0]["runs"]
+    assert run["patches_s"] == []
 
 
 def test_runs_of_different_length_and_step_share_their_time():
