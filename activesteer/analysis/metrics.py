@@ -42,6 +42,8 @@ _MEASURABLE: Final[tuple[Callable[[RecordingLike], dict[str, float]], ...]] = (
     lambda recording: {"speed_end_mps": float(recording["speed_mps"][-1])},
 )
 """Functions that evaluate the quantities that a test car can measure."""
+_STANDING_MPS: Final = 1.0
+"""Largest speed of a car that stands, and rocks on its springs and tyres [m/s]."""
 
 
 def general_metrics(recording: RecordingLike) -> dict[str, float]:
@@ -50,14 +52,24 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
     Returns:
         `<name>_peak_abs_<unit>` and `<name>_rms_<unit>` of yaw rate, lateral acceleration, sideslip (above 10 km/h)
         and roll; the largest steering wheel angle; `friction_utilisation_max`, the largest fraction of its available
-        friction that any tyre uses; and `speed_end_mps`.
+        friction that any tyre uses; `speed_end_mps`; and, if the car never drives faster than 1 m/s,
+        `displacement_at_rest_m`, its largest distance from where the run began.
 
     Raises:
         RecordingError: a channel is missing.
     """
     use = max(float(recording[f"{corner}_friction_utilisation"].max()) for corner in CORNERS)
     *values, end = (part(recording) for part in _MEASURABLE)
-    return {name: value for part in (*values, {"friction_utilisation_max": use}, end) for name, value in part.items()}
+    all_parts = (*values, {"friction_utilisation_max": use}, end, _displacement_at_rest(recording))
+    return {name: value for part in all_parts for name, value in part.items()}
+
+
+def _displacement_at_rest(recording: RecordingLike) -> dict[str, float]:
+    """Return how far a standing car moves, or nothing for a car that drives."""
+    if float(np.abs(recording["speed_mps"]).max()) > _STANDING_MPS:
+        return {}
+    moved_m = np.hypot(*(recording[name] - recording[name][0] for name in ("x_m", "y_m")))
+    return {"displacement_at_rest_m": float(moved_m.max())}
 
 
 def measured_metrics(recording: RecordingLike) -> dict[str, float]:

@@ -276,6 +276,7 @@ METRICS: Final = {
             "", "wheel_load_coefficient_max", "wheel_lift_share", "extended_road_share", better=_SMALLER, unit=_PERCENT
         ),
         *_declare("m", "suspension_travel_max", better=_SMALLER),
+        *_declare("m", "displacement_at_rest", better=_SMALLER, unit=DisplayUnit("mm", 1000.0)),
         *_declare("", "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_declare(
             "", "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",

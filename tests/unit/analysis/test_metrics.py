@@ -56,7 +56,19 @@ def test_every_kind_of_manoeuvre_has_an_evaluation():
 
 @pytest.mark.parametrize("kind", EVALUATIONS)
 def test_a_kind_has_ten_different_key_metrics(kind):
-    assert len(set(KEY_METRICS[kind])) == 10
+    # A car that stands has one more, which a car that drives does not have.
+    assert len(set(KEY_METRICS[kind])) == len(KEY_METRICS[kind])
+    assert len(set(KEY_METRICS[kind]) - {"displacement_at_rest_m"}) == 10
+
+
+def test_a_car_that_stands_tells_how_far_it_moves():
+    run = wave()
+    assert "displacement_at_rest_m" not in metrics(run)
+    run.channels["speed_mps"] = np.full_like(TIME_S, 0.1)
+    # It moves 3 mm back and 4 mm to the side, and half of this back again.
+    way = np.interp(TIME_S, [0.0, 1.0, 2.0], [0.0, 1.0, 0.5])
+    run.channels |= {"x_m": 7.0 - 0.003 * way, "y_m": -2.0 + 0.004 * way}
+    assert metrics(run)["displacement_at_rest_m"] == pytest.approx(0.005)
 
 
 def test_peaks_and_root_mean_squares_of_a_sine():
