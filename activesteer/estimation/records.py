@@ -37,7 +37,10 @@ MEMORY: Final = np.dtype(
         [
             ("estimate", np.float64, (14,)),
             ("calls", np.intp),
-            *((name, np.float64) for name in ("waited_s", "innovation", "rate_innovation", "unexplained")),
+            *(
+                (name, np.float64)
+                for name in ("waited_s", "innovation", "rate_innovation", "mean_innovation", "unexplained")
+            ),
             *((name, np.float64) for name in ("left_out", "friction_used", "friction_borne")),
             ("last", np.float64, (3,)),
             ("last_spin_radps", np.float64, (4,)),
@@ -56,11 +59,11 @@ MEMORY: Final = np.dtype(
 """Memory of an estimator.
 
 The estimate and the number of calls. The last step of the filters: time since then, squared error of both measurements
-and of the yaw rate over their expected covariances, sum of what is unexplained in them, wheels left out, smoothed and
-largest use of the friction, last samples. States and covariances of the filters, and the current state. Inputs of the
-model: steer angles, longitudinal acceleration, longitudinal force of the front axle, moment of all longitudinal forces,
-lateral acceleration that loads the wheels, roll; and for each wheel its
-longitudinal force, its load, the speed of the car by this wheel, and the time since it slid.
+and of the yaw rate over their expected covariances, mean of the first, sum of what is unexplained in them, wheels left
+out, smoothed and largest use of the friction, last samples. States and covariances of the filters, and the current
+state. Inputs of the model: steer angles, longitudinal acceleration, longitudinal force of the front axle, moment of all
+longitudinal forces, lateral acceleration that loads the wheels, roll; and for each wheel its longitudinal force, its
+load, the speed of the car by this wheel, and the time since it slid.
 """
 
 KNOWN: Final = np.dtype(

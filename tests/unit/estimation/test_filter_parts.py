@@ -321,6 +321,60 @@ def test_lateral_acceleration_shows_the_offset_of_its_own_sensor_unless_it_is_a_
     assert memory.state[RATE_OFFSET] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_surprising_acceleration_moves_the_car_and_the_road_by_a_limited_amount(known, memory, setup):
+    """In a slalom on snow, one sample tilted the road by 0.3 m/s2, and the lateral speed followed."""
+    tyres, deaf = np.array([tyre.force_N for tyre in setup.estimation.tyres]), known.copy()
+    deaf["rate_variance_rad2ps2"] = 1e12
+    memory["speed_mps"] = 20.0
+    memory["state"][FRICTION], memory["covariance"][FRICTION, FRICTION] = 0.3, 0.02**2
+    memory["state"][[FRONT_SLIP, REAR_SLIP]] = math.radians(2.0)
+    predict(known, tyres, memory, 0.01)  # correlates all states
+    front_N, rear_N = forces_of(known, tyres, memory, memory.state)
+
+    def moved(error_mps2):
+        copy = memory.copy()
+        of_both, _ = correct(deaf, tyres, copy, 0.0, (front_N + rear_N) / known.mass_kg - error_mps2, 0.01)
+        assert np.linalg.eigvalsh(copy.covariance).min() > -1e-12
+        return of_both, copy.state - memory.state
+
+    places = [LATERAL_SPEED, BANK]
+    (ordinary, small), (surprise, large), (_, largest) = moved(0.1), moved(3.0), moved(6.0)
+    assert ordinary < 4.0 < surprise
+    assert np.abs(small[places]).min() > 0.0
+    # As an error of two standard deviations, however large it is. The noise grows a little with the acceleration.
+    assert large[places] == pytest.approx(small[places] * math.sqrt(4.0 / ordinary), rel=0.05)
+    assert largest[places] == pytest.approx(large[places], rel=0.05)
+    # The forces follow it.
+    assert largest[FRONT_SLIP] == pytest.approx(2.0 * large[FRONT_SLIP], rel=0.05)
+    assert large[FRICTION] < small[FRICTION] < 0.0
+
+
+@pytest.mark.parametrize(("mean_innovation", "counts"), [(1.0, True), (20.0, False)])
+def test_friction_not_learned_under_large_longitudinal_forces_is_noise_unless_a_sensor_fails(
+    known, memory, setup, mean_innovation, counts
+):
+    """A car that drives off on snow, and believes in ice, has an error that is no error of its motion."""
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    memory["speed_mps"], memory["mean_innovation"] = 20.0, mean_innovation
+    memory["state"][FRICTION] = 0.15
+    memory["state"][[FRONT_SLIP, REAR_SLIP]] = math.radians(4.0)
+    memory["along_N"][:2], memory["front_along_N"] = 800.0, 1600.0
+    predict(known, tyres, memory, 0.01)
+    front_N, rear_N = forces_of(known, tyres, memory, memory.state)
+    sure = memory.copy()
+    sure["covariance"][FRICTION, FRICTION] = 1e-8
+    # A tenth more friction than believed.
+    felt_mps2 = (front_N + rear_N) / known.mass_kg + 0.1 * GRAVITY_MPS2
+    before = memory.state.copy()
+    (unsure_of_road, _), (sure_of_road, _) = (
+        correct(known, tyres, each, 0.0, felt_mps2, 0.01) for each in (memory, sure)
+    )
+    assert (memory.state[FRICTION:] == before[FRICTION:]).all()
+    assert sure_of_road > 4.0
+    assert (unsure_of_road < 1.0) == counts
+    assert unsure_of_road == pytest.approx(sure_of_road, rel=0.01) or counts
+
+
 def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_does_not_feel_it(known, memory, setup):
     tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
     memory["speed_mps"], memory["state"][BANK] = 20.0, 0.5
