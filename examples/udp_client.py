@@ -1,4 +1,4 @@
-"""Steer a running simulation from another process by the messages of docs/coupling.md.
+"""Steer a running simulation from another process by the messages of docs/udp.md.
 
 Start first: activesteer run straight_line --set duration_s=20 --realtime --udp 5005
 """

@@ -1,4 +1,4 @@
-"""UDP link: commands from another process, and the state of the car back to it (see docs/coupling.md)."""
+"""UDP link: commands from another process, and the state of the car back to it (see docs/udp.md)."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
        cc -Icar step_steer.c -o step_steer car/libactivesteer_car.so -Wl,-rpath,car -Wl,-rpath-link,car -lm
        ./step_steer
 
-   Guide: docs/coupling.md. */
+   Guide: docs/fmu_car.md. */
 #include "activesteer_car.h"
 #include <stdio.h>
 #include <stdlib.h>

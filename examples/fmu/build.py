@@ -3,7 +3,7 @@
     make fmus
     activesteer run sine_with_dwell -c none -c afs -c build/fmus/paper_afs_fmi2.fmu
 
-Needs a C compiler. Guide: docs/coupling.md.
+Needs a C compiler. Guide: docs/fmu_controller.md.
 """
 
 import hashlib
