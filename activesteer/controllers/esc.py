@@ -18,6 +18,7 @@ times are our choice.
 
 from __future__ import annotations
 
+from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
@@ -39,11 +40,13 @@ class Esc:
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
         """Return the brake torques for the current yaw rate error and sideslip angle."""
         p, now = self._parameters, self._estimator.step(measurement)
-        if now.speed_mps < p.least_speed_mps:
+        if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
         desired = self._reference.borne(
             command.front_steer_demand_rad, now.speed_mps, now.friction, measurement.ay_mps2
         )
+        if now.speed_mps < p.least_speed_mps:
+            return ActuatorCommand(yaw_rate_desired_radps=desired, estimate=now)
         moment = self._yaw_inertia_kgm2 * stabilising(p, desired - now.yaw_rate_radps, now.sideslip_rad)
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
         braked = max(torques)  # of the only wheel that brakes

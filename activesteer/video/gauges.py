@@ -120,7 +120,7 @@ class Gauges:
         _write(layer, (1.4 * gap, base), dial.label, colour, self._text)
         for x, end, reading in zip(self._columns[:-1], self._columns[1:], self._readings, strict=True):
             found = dial.value(reading.channel, time_s)
-            value = reading.value_text(found) if math.isfinite(found) else "-"
+            value = reading.value_text(found).replace("-", "\N{MINUS SIGN}") if math.isfinite(found) else "-"
             unit_at = end - 2.0 * gap - self._small.getlength(reading.unit.name)
             _write(layer, (x, base), reading.short, _GREY, self._small)
             _write(layer, (unit_at - 0.7 * gap, base), value, _WHITE, self._text, "rs")

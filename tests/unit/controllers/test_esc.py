@@ -106,5 +106,8 @@ def test_drive_is_taken_back_by_what_the_brake_takes_and_no_further(known):
     assert coasting.drive_torque_change_Nm == 0.0
 
 
-def test_below_20_kmh_it_rests(known):
+def test_below_20_kmh_it_rests_and_still_tells_the_desired_yaw_rate(known):
     assert not any(answer(known, 0.0, 0.4, 5.0))
+    rests = held(Esc(known), steering(0.05), measured(0.4, 5.0), 500)
+    turn_radps = SingleTrack(known.single_track).yaw_rate_gain(rests.estimate.speed_mps) * 0.05
+    assert rests.yaw_rate_desired_radps == pytest.approx(turn_radps, rel=0.01)
