@@ -21,6 +21,10 @@ steered to the turn of new tyres, its rear axle could slide on snow. Therefore, 
 that understeers more by its estimated stiffnesses keeps its own turn: the front wheels get the additional slip angle.
 Both axles then turn by the same angle, which leaves the yaw rate as it is.
 
+A car with worse rear tyres than those of its file may not bear the desired turn although the estimated friction does.
+Therefore the superposition into the turn fades once the desired turn has been at the limit of the known friction for a
+time. A lane change is over before.
+
 u* are the angles of the turn at the time when the current demand takes effect, a lag T_a and a call ahead. The law is
 
     u = u* - K(v) (x - x*),        x = (r, beta, f, g, a, delta_H, u before)
@@ -96,6 +100,9 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_
 )
 _SAME_RAD: Final = 1e-6
 """Difference of an angle from its demand that does not count as a limit [rad]."""
+_LIMIT_FROM, _LIMIT_TO = 0.95, 1.05
+"""Use of the known friction by the desired turn from which the time at the limit counts, and from which it counts fully
+[-]. The first values that were tried."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it, its action fades out until `MIN_SPEED_MPS` [m/s]."""
 
@@ -148,6 +155,8 @@ class Lqr(NativeBlock):
     _decay_s: float
     _lacking_radps: float
     _against_s: float
+    _at_limit_s: float
+    _turned_radps: float
     _driver_before_rad: float
     _torque_per_pressure_NmpPa: PerWheel
     _moment_per_torque: PerWheel
@@ -174,6 +183,7 @@ class Lqr(NativeBlock):
         self._lag_s, self._hold_s, self._decay_s = self._servos.lag_s, p.hold_s, p.decay_s
         self._lacking_radps = p.lacking_radps
         self._against_s = self._driver_before_rad = 0.0
+        self._at_limit_s = self._turned_radps = 0.0
         self._superposition_limit_rad = self._servos.superposition_limit_rad
         self._relaxation_length_m, self._friction_deviations = p.relaxation_length_m, p.friction_deviations
         self._against_driver_rad = p.against_driver_rad
@@ -349,6 +359,13 @@ def fed_back(
     lacking = (desired - now[_YAW_RATE]) / block._lacking_radps
     least *= min(max(1.0 - lacking, 0.0), 1.0)
     most *= min(max(1.0 + lacking, 0.0), 1.0)
+    further = 1.0 - certain * _time_at_limit(
+        block, desired, speed * abs(desired) / (block._reference._most_mps2 * friction)
+    )
+    if desired > 0.0:
+        most *= further
+    else:
+        least *= further
     front_demand, rear_demand = authority * (held_front - front_feedback), authority * (held_rear - rear_feedback)
     return desired, sideslip, steady, rear, front_demand, rear_demand, least, most
 
@@ -381,6 +398,23 @@ def _patience(block: Lqr, driver_rad: float) -> float:
         block._against_s = min(block._against_s + block._interval_s, block._hold_s + block._decay_s)
     block._driver_before_rad += -math.expm1(-block._interval_s / block._hold_s) * (driver_rad - before)
     return min((block._hold_s + block._decay_s - block._against_s) / block._decay_s, 1.0)
+
+
+@shared
+def _time_at_limit(block: Lqr, desired_radps: float, used: float) -> float:
+    """Return how far the superposition into the turn has faded, 0 to 1: all at a turn that stays at its limit.
+
+    It counts the time, as `_patience` does. A turn to the other side begins anew.
+    """
+    if desired_radps * block._turned_radps < 0.0:
+        block._at_limit_s = 0.0
+    block._turned_radps = desired_radps
+    counts = min((used - _LIMIT_FROM) / (_LIMIT_TO - _LIMIT_FROM), 1.0)
+    if counts > 0.0:
+        block._at_limit_s = min(block._at_limit_s + counts * block._interval_s, block._hold_s + block._decay_s)
+    else:
+        block._at_limit_s = max(block._at_limit_s - block._interval_s, 0.0)
+    return min(max((block._at_limit_s - block._hold_s) / block._decay_s, 0.0), 1.0)
 
 
 @shared

@@ -68,7 +68,8 @@ class LqrParameters:
     """Superposition against the driver's angle that is allowed while the friction is unknown [rad]; it grows to the
     limit of the actuator with the certainty of the friction."""
     hold_s: _Lag
-    """Time for which the superposition is held against a driver who does not steer back [s]."""
+    """Time for which the superposition is held against a driver who does not steer back, and into a turn at the limit
+    of the friction [s]."""
     decay_s: _Lag
     """Time in which it then decays to zero [s]."""
     lacking_radps: _Scale

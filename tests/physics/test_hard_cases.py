@@ -82,6 +82,27 @@ def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_sn
     assert np.abs(controlled["sideslip_rad"][before]).max() < math.radians(1.0)
 
 
+@pytest.mark.parametrize("controller", ["integrated", pytest.param("lqr", marks=pytest.mark.slow)])
+def test_a_loaded_car_of_worn_rear_tyres_is_not_steered_over_its_limit_in_a_turn(controller: str):
+    """The turn of the nominal car needs 7.4 m/s2, and the rear tyres bear 6.9. Its rear axle slid, or it spun."""
+    pytest.importorskip("daqp")
+    changes = {
+        "load.payload_kg": 202.6, "load.payload_forward_change_m": 0.813, "load.roof_kg": 89.1,
+        "factors.front_cornering_stiffness": 0.949, "factors.rear_cornering_stiffness": 1.081,
+        "factors.front_tyre_friction": 0.973, "factors.rear_tyre_friction": 0.789, "sensors.seed": 2,
+        "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 13.49,
+    }  # fmt: skip
+    turn = {"road.mu": 0.869, "turn.lateral_acceleration_mps2": 5.7, "brake.pedal": 0.673}
+    none, controlled = (
+        simulate("brake_in_turn", name, overrides=SENSORS | changes | turn) for name in ("none", controller)
+    )
+    before = controlled.time_s < controlled.metrics["braking_begin_time_s"]
+    # Without the rule: 7.3 deg before braking, and 1.14 m of path error instead of 0.11.
+    assert np.abs(controlled["sideslip_rad"][before]).max() < math.radians(2.0)
+    name = "path_deviation_after_1000ms_m"
+    assert abs(controlled.metrics[name]) < abs(none.metrics[name]) + 0.1
+
+
 @pytest.mark.parametrize(
     ("controller", "changes", "told"),
     [

@@ -174,7 +174,8 @@ def test_moment_of_the_drivers_brakes_is_held_by_both_axles_without_side_force(k
 def against(known, driver_rad: float, calls: int, controller=None):
     """Superposition of a regulator that takes a road for slippery, for a constant driver's angle."""
     controller = Lqr(known) if controller is None else controller
-    slippery = Estimate(25.0, 0.0, 0.0, 0.05, 0.2, *[0.01] * 5)
+    turns_radps = math.copysign(0.05, driver_rad)
+    slippery = Estimate(25.0, 0.0, 0.0, turns_radps, 0.2, *[0.01] * 5)
 
     class Slippery:
         innovation = 0.0
@@ -185,7 +186,7 @@ def against(known, driver_rad: float, calls: int, controller=None):
     controller._estimator = Slippery()  # pyright: ignore[reportAttributeAccessIssue]
     added_rad, found = 0.0, []
     for _ in range(calls):
-        seen = measured(0.05)._replace(superposition_rad=added_rad)
+        seen = measured(turns_radps)._replace(superposition_rad=added_rad)
         added_rad = controller.step(steering(driver_rad), seen).superposition_demand_rad
         found.append(added_rad)
     return controller, found
@@ -201,7 +202,39 @@ def test_superposition_is_not_held_against_a_driver_who_does_not_steer_back(know
     assert min(found[begun + decayed + 20 :]) > -math.radians(0.05)
     # To the other side it may act anew.
     _, other = against(known, -0.2, round(0.5 / INTERVAL_S), controller)
-    assert max(other) > math.radians(0.9)
+    assert other[-1] > math.radians(0.9)
+
+
+def test_superposition_into_a_turn_fades_only_if_the_desired_turn_stays_at_the_known_limit(known):
+    """Else `lqr` steers a car with worn rear tyres over their limit; a lane change is over before."""
+    p, most = known.gains.lqr, known.gains.servos.superposition_limit_rad
+    at_limit_rad = 0.2
+
+    def into_the_turn_rad(controller, driver_rad, time_s, friction_std=0.001):
+        class Known:
+            innovation = 0.0
+
+            def step(self, _measurement):
+                # The car turns as desired, which limits no superposition.
+                now = Estimate(25.0, 0.0, 0.0, desired_radps, 0.3, *[0.001] * 5)
+                return now._replace(friction_std=friction_std)
+
+        controller._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
+        desired_radps = math.copysign(0.106, driver_rad) if abs(driver_rad) == at_limit_rad else 0.0
+        for _ in range(round(time_s / INTERVAL_S)):
+            found = controller.turn(steering(driver_rad), measured(0.0))
+            desired_radps = found.desired_radps
+        return max(math.copysign(1.0, driver_rad) * angle for angle in found.range_rad)
+
+    soon, late = 0.9 * p.hold_s, 1.1 * (p.hold_s + p.decay_s)
+    controller = Lqr(known)
+    assert into_the_turn_rad(controller, at_limit_rad, soon) == pytest.approx(most, rel=0.01)
+    assert into_the_turn_rad(controller, at_limit_rad, late) == pytest.approx(0.0, abs=0.01 * most)
+    # A turn to the other side, a gentle turn, and a friction that nobody knows.
+    assert into_the_turn_rad(controller, -at_limit_rad, soon) == pytest.approx(most, rel=0.01)
+    assert into_the_turn_rad(Lqr(known), 0.1 * at_limit_rad, late) == pytest.approx(most, rel=0.01)
+    unknown = known.gains.estimator.friction_std
+    assert into_the_turn_rad(Lqr(known), at_limit_rad, late, unknown) == pytest.approx(most, rel=0.01)
 
 
 @pytest.mark.parametrize("stiffness", [(0.7, 0.85), (0.85, 0.7), (1.2, 1.1)])
