@@ -79,8 +79,9 @@ The 95 % interval (Wilson) of the proportion decides the verdict:
 Half of the samples have ideal sensors, and half have the sensors of a production car. The column after the verdict
 gives the proportion with production sensors.
 
-The last column names the factor that explains most of the verdict, and the fraction of the variance that it explains.
-The fraction comes from a regression on each factor and its square. The cell is empty if no factor is significant.
+The last column names the factor with the largest effect on the verdict, and the fraction of the variance that it
+explains. The fraction comes from a regression on each factor and its square. The cell is empty if no factor is
+significant.
 
 Claims without a driver concern open-loop manoeuvres, where the steering wheel follows a table.
 

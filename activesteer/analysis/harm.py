@@ -63,7 +63,7 @@ def is_controlled(metrics: Metrics) -> bool:
 
 
 def _turns_on(metrics: Metrics) -> str:
-    """Say which share of the yaw rate remains after a sine with dwell, or return an empty text within the limits."""
+    """Describe the yaw rate that remains after a sine with dwell, empty within the limits."""
     said = ""
     for at_s, limit in zip(INSTANTS_S, RATIO_LIMITS, strict=True):
         share = metrics.get(f"yaw_rate_after_{1000 * at_s:.0f}ms_share")
@@ -93,7 +93,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
 
 
 def failures(recording: Recording) -> Iterator[str]:
-    """Describe the failures of a run, with the time of its steering actuators at their limits before a spin."""
+    """Describe the failures of a run, and how long its steering actuators were at their limits before a spin."""
     yield from losses(judged_metrics(recording))
     if len(recording) < 2 or "sideslip_rad" not in recording:  # measured by others
         return
@@ -113,7 +113,7 @@ def failures(recording: Recording) -> Iterator[str]:
 
 
 def kept(metrics: Mapping[str, float]) -> Iterator[str]:
-    """Yield the requirements of its manoeuvre that a run met, by its metrics."""
+    """Yield the requirements of the manoeuvre that a run met, according to its metrics."""
     if metrics.get(STAYS_IN_LANES) == 1.0:
         yield "stays in the lanes"
     if metrics.get(CONES_MISSED) == 0.0 and not metrics.get(CONES_HIT):

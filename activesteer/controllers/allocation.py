@@ -169,7 +169,7 @@ def _relieved(
     angle_rad: tuple[float, float],
     ay_mps2: float,
 ) -> float:
-    """Return the superposition angle that unloads front wheels which turn the car too far [rad]."""
+    """Return the superposition angle, reduced where the front wheels turn the car further than wanted [rad]."""
     front_slip_rad, rear_slip_rad, front, rear = axle_forces(
         block._curves, now, driver_rad + angle_rad[0], angle_rad[1]
     )

@@ -79,7 +79,7 @@ class Child:
         return self._received(length, end_s)
 
     def _problem(self, reason: BaseException, doing: str, limit_s: float) -> str | None:
-        """Return the reason for a missing answer, or None for an exception of another origin."""
+        """Return the reason why there is no answer, or None if the exception has another cause."""
         if not isinstance(reason, EOFError | OSError):
             return None
         late = isinstance(reason, TimeoutError)

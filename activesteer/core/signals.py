@@ -243,7 +243,7 @@ class DriverCommand(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """Signals of a real car's sensors.
+    """Signals of the sensors of a car.
 
     The field of a sensor has the name of the sensor in a vehicle file, followed by the unit.
 

@@ -150,7 +150,7 @@ def _force_errors(known, front_N, rear_N):
 
 @compiled
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
-    """Compute the state after an interval, and its derivatives by the current state."""
+    """Compute the state after an interval, and its derivatives with respect to the current state."""
     state = memory.state
     start, other, braked = state.copy(), np.empty(N_STATES), _is_braked(known, memory)
     follow(known, tyres, memory, start, duration_s, moved)

@@ -112,7 +112,7 @@ def predict_speed(known, memory, rate_mps2, duration_s):
 
 @inlined
 def brush_slip(along_N, load_N, friction, slip_stiffness):
-    """Return the slip of a wheel, its derivative by the used fraction of the friction, and this fraction."""
+    """Return the slip of a wheel, its derivative with respect to the used friction fraction, and this fraction."""
     used = abs(along_N) / (friction * max(load_N, 1.0))
     root = (1.0 - min(used, _MOST_USED)) ** (1.0 / 3.0)
     slip = 3.0 * friction / slip_stiffness * (1.0 - root)

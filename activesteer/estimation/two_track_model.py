@@ -179,7 +179,7 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """Advance the roll of the body by an interval, including the load of springs and dampers.
+    """Advance the roll of the body by an interval, and compute the load transfer by springs and dampers.
 
     Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
     """

@@ -44,7 +44,7 @@ class Column(NamedTuple):
 
 
 def check_rows(count: int, path: Path) -> None:
-    """Reject a file with too many rows in its metadata, before the rows are read."""
+    """Reject a file that declares too many rows, before the rows are read."""
     limits.check_count(count, limits.MAX_ROWS, "rows", RecordingError, file=path.name)
 
 

@@ -100,7 +100,7 @@ _SPEED_MPS: Final = 20.0
 
 
 def slip_limit_rad(scenario: Scenario) -> float | None:
-    """Return the slip angle of a rear tyre's largest side force [rad], None for a flat curve or several frictions."""
+    """Return the slip angle at which a rear tyre's side force peaks [rad], None without a clear or a single peak."""
     road = scenario.maneuver.road
     if is_overruled(road, "mu") or road.patches:
         return None

@@ -1,4 +1,4 @@
-"""UN R79: steering effort at walking pace, and failures of auxiliary steering equipment in a circle of 100 m (annex 4).
+"""UN R79: steering effort at walking pace, and failures of auxiliary steering equipment on a 100 m circle (annex 4).
 
 Every fault is driven at least twice from one state: with hands fixed (steering wheel and pedals move as without the
 fault), and with the driver. The fault-tolerant time is the longest duration of the fault, hands fixed, without

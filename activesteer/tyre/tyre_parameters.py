@@ -107,7 +107,7 @@ def is_finite(tyre: np.record) -> bool:
 
 
 def culprit(tyre: np.record, names: Iterable[str]) -> str | None:
-    """Return the extremely large coefficient whose default would make the tyre finite, or None."""
+    """Return the extremely large coefficient that alone makes the forces infinite, or None if there is none."""
     enormous = (name for name in names if abs(tyre[name]) > _ENORMOUS)
     for name in sorted(enormous, key=lambda name: -abs(tyre[name])):
         tried = np.atleast_1d(tyre).copy()

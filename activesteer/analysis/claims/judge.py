@@ -142,7 +142,7 @@ class Scenario:
 
 
 def _judged(statement: Statement, metrics: RunMetrics, obstacle: str, hindrance: float) -> Claim:
-    """Return the claim. It passes if all its conditions hold and there is no obstacle."""
+    """Return the claim, which passes if all its conditions hold and no `obstacle` prevents a pass."""
     needed = {place for one in statement.requirements for place in one.metrics}
     runs: dict[EvaluatedRun, dict[str, float | None]] = {run: {} for _, run in needed}
     for name, run in needed:
@@ -171,7 +171,7 @@ def _is_cut_short(recording: RecordingLike) -> bool:
 
 
 def obstacle_of(recordings: Mapping[str, RecordingLike], cut: Sequence[str]) -> tuple[str, float]:
-    """Return the reason why no claim about three runs can pass, and its distance from vanishing, 0 to 1."""
+    """Return the reason why no claim about three runs can pass, and how far the runs are from removing it, 0 to 1."""
     # A run must be whole. The run of ars must turn the rear wheels and the run of afs the superposition gear, by
     # `metric_table.STEER_RAD` more than straight ahead and for longer than noise does (`largest_action`). No run may
     # demand as much of an actuator that its system does not have: an action that was not performed proves nothing.

@@ -78,7 +78,7 @@ class ReportedRun(NamedTuple):
 
     @property
     def metrics(self) -> Mapping[str, float]:
-        """Metrics to show, without cones that a person did not reach, and without values of a missing response."""
+        """Metrics to show: see `without_response` and, for a drive by hand, `as_far_as_driven`."""
         metrics = without_response(self.recording, self.recording.metrics)
         return as_far_as_driven(self.recording, metrics) if self.by_hand else metrics
 

@@ -91,7 +91,7 @@ def _words(name: str) -> str:
 
 
 def _finding(data: Mapping[str, Any]) -> list[Text]:
-    """Name the factor with the largest rank correlation with the first metric, for each controller."""
+    """Name, for each controller, the factor with the largest rank correlation with the first metric."""
     rows, names, told = data["rows"], data["by_group"][0], []
     name = next((name for name in (*_FIRST, *names) if name in names), None)
     for place, controller in enumerate(data["controllers"] if name else ()):

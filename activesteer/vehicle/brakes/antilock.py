@@ -106,7 +106,7 @@ def _largest_slip(setup, state, wheel, fed_Pa):
 
 @inlined
 def _least_slip(setup, state, wheel, car_mps2):
-    """Smallest slip for a release of a wheel by its deceleration."""
+    """Smallest slip at which the deceleration of a wheel can release it."""
     phase = state.phase[wheel]
     minimum = setup.first_slip if phase == OFF else setup.min_slip - setup.min_slip_gain_s2pm * car_mps2
     if phase == BUILD and state.phase_s[wheel] < _SETTLES_S:
