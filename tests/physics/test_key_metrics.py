@@ -17,6 +17,7 @@ from tests.physics.runs import assert_has_key_metrics, run
         ("random_steer", {"duration_s": 14.0}),
         ("straight_braking", {}),
         ("straight_line", {"duration_s": 2.0}),
+        ("hill_hold", {}),
     ],
 )
 def test_key_metrics_are_metrics_of_a_run(maneuver: str, overrides: dict[str, Any]) -> None:
