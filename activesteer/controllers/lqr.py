@@ -359,7 +359,7 @@ def fed_back(
     lacking = (desired - now[_YAW_RATE]) / block._lacking_radps
     least *= min(max(1.0 - lacking, 0.0), 1.0)
     most *= min(max(1.0 + lacking, 0.0), 1.0)
-    further = 1.0 - certain * _time_at_limit(
+    further = 1.0 - certain * _faded_at_limit(
         block, desired, speed * abs(desired) / (block._reference._most_mps2 * friction)
     )
     if desired > 0.0:
@@ -401,10 +401,11 @@ def _patience(block: Lqr, driver_rad: float) -> float:
 
 
 @shared
-def _time_at_limit(block: Lqr, desired_radps: float, used: float) -> float:
-    """Return how far the superposition into the turn has faded, 0 to 1: all at a turn that stays at its limit.
+def _faded_at_limit(block: Lqr, desired_radps: float, used: float) -> float:
+    """Return the part of the superposition into the turn that has faded, 0 to 1.
 
-    It counts the time, as `_patience` does. A turn to the other side begins anew.
+    It counts the time at the limit, as `_patience` counts the time against the driver. A turn to the other side resets
+    it.
     """
     if desired_radps * block._turned_radps < 0.0:
         block._at_limit_s = 0.0

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from activesteer.controllers.parameters import ControllerSetup, YawMomentParameters
 from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.estimation.records import AVERAGED_S, EXPLAINED, UNEXPLAINED
 from activesteer.native.records import NativeBlock
 from activesteer.native.shared_laws import shared
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, yaw_rate_gain
@@ -103,11 +103,6 @@ class BorneTurnReference(TurnReference):
         return side * max(side * desired_radps - fall_radps, min(side * desired_radps, 0.0))
 
 
-_AVERAGED_S: Final = 0.2
-"""Time constant of the mean of the squared innovations [s]: some twenty samples."""
-_EXPLAINED, _UNEXPLAINED = 8.0, 16.0
-"""Mean squared innovation, divided by its covariance, up to which the model explains the car, and from which it does
-not [-]. Two measured values give 2 on average; the largest mean in 14 ordinary runs was 4.7."""
 _FALL_S, _RISE_S = 0.3, 2.0
 """Times in which the authority falls from 1 to 0, and rises again [s]."""
 
@@ -125,7 +120,7 @@ class ConfidenceMonitor(NativeBlock):
     def __init__(self, setup: ControllerSetup) -> None:
         """Compute the constants of the monitor."""
         self._prior = setup.gains.estimator.friction_std
-        self._fraction = -math.expm1(-setup.timestep_s / _AVERAGED_S)
+        self._fraction = -math.expm1(-setup.timestep_s / AVERAGED_S)
         self._fall, self._rise = setup.timestep_s / _FALL_S, setup.timestep_s / _RISE_S
         self._mean, self._authority = 0.0, 1.0
 
@@ -138,8 +133,8 @@ def confidence(block: ConfidenceMonitor, innovation: float, friction_std: float)
     factor on the demands of the controller: 1 while the model explains the car, falling to 0 otherwise.
     """
     block._mean += block._fraction * (innovation - block._mean)
-    if block._mean > _EXPLAINED or block._authority < 1.0:
-        wanted = min(max((_UNEXPLAINED - block._mean) / (_UNEXPLAINED - _EXPLAINED), 0.0), 1.0)
+    if block._mean > EXPLAINED or block._authority < 1.0:
+        wanted = min(max((UNEXPLAINED - block._mean) / (UNEXPLAINED - EXPLAINED), 0.0), 1.0)
         block._authority += min(max(wanted - block._authority, -block._fall), block._rise)
     left = friction_std / block._prior
     known = 1.0 - left * left

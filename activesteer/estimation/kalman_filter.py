@@ -44,8 +44,10 @@ import numpy as np
 
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.estimation.records import (
+    AVERAGED_S,
     AY_OFFSET,
     BANK,
+    EXPLAINED,
     FRICTION,
     FRONT_ERROR,
     FRONT_SLIP,
@@ -58,6 +60,7 @@ from activesteer.estimation.records import (
     REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
+    UNEXPLAINED,
     YAW_RATE,
 )
 from activesteer.estimation.two_track_model import (
@@ -88,14 +91,6 @@ _SURPRISING: Final = 4.0
 accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
 offset by 0.34 m/s2, six of its standard deviations. The friction behind the snow was then too low by 0.1. In a slalom
 on snow, errors of eleven standard deviations moved the lateral speed by 0.7 m/s in 0.1 s."""
-_AVERAGED_S: Final = 0.2
-_PLAUSIBLE: Final = 8.0
-_FAULTY: Final = 16.0
-"""Under large longitudinal forces, the uncertain friction is noise of the lateral acceleration, because a car that
-drives off with too low a friction would otherwise be believed to slide. This noise fades while the mean squared
-innovation over this time rises from the first to the second number, which are those of `ConfidenceMonitor`: then a
-sensor fails. A yaw rate with the wrong sign gave 38 to 440, drive torque on snow at most 43 for a moment. Without
-fading, a car with such a sensor spun in a lane change, because only the lateral acceleration shows its motion."""
 _NEW_RATIO_STD: Final = 0.3
 """Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth of a
 second one axle is still on the old one. Chosen from 0.1, 0.2 and 0.3 by the error of the sideslip angle."""
@@ -329,7 +324,8 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
     braked, unsure_mps2 = _is_braked(known, memory), 0.0
     if braked:
-        plausible = min(max((_FAULTY - memory.mean_innovation) / (_FAULTY - _PLAUSIBLE), 0.0), 1.0)
+        # Without fading, a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
+        plausible = min(max((UNEXPLAINED - memory.mean_innovation) / (UNEXPLAINED - EXPLAINED), 0.0), 1.0)
         unsure_mps2 = plausible * row[FRICTION] * math.sqrt(covariance[FRICTION, FRICTION])
         bend_mps2 *= plausible
         row[FRICTION] = 0.0
@@ -354,7 +350,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
     state[REAR_RATIO] = min(max(state[REAR_RATIO], LEAST_RATIO), LARGEST_RATIO)
-    memory.mean_innovation += duration_s / (duration_s + _AVERAGED_S) * (of_both - memory.mean_innovation)
+    memory.mean_innovation += duration_s / (duration_s + AVERAGED_S) * (of_both - memory.mean_innovation)
     return of_both, of_rate
 
 

@@ -371,8 +371,10 @@ def test_friction_not_learned_under_large_longitudinal_forces_is_noise_unless_a_
     )
     assert (memory.state[FRICTION:] == before[FRICTION:]).all()
     assert sure_of_road > 4.0
-    assert (unsure_of_road < 1.0) == counts
-    assert unsure_of_road == pytest.approx(sure_of_road, rel=0.01) or counts
+    if counts:
+        assert unsure_of_road < 1.0
+    else:
+        assert unsure_of_road == pytest.approx(sure_of_road, rel=0.01)
 
 
 def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_does_not_feel_it(known, memory, setup):
