@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import scipy.linalg
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -125,9 +126,7 @@ def round_trip(
     """Return the return ratio M of the demands, where u = M u closes the loop."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
-    states = np.linalg.solve(
-        (1.0 / back)[:, None, None] * np.eye(len(car.a)) - car.a, np.asarray(car.b[:, 1:], dtype=np.complex128)
-    )
+    states = _states(car.a, car.b[:, 1:], 1.0 / back)
     rows = {name: car.c[index] for index, name in enumerate(OUTPUTS)}
     # The accelerometer rolls with the body. All signals but the yaw rate belong to the start of the step.
     leaning = rows["ay_mps2"] + GRAVITY_MPS2 * rows["roll_rad"]
@@ -140,6 +139,16 @@ def round_trip(
     seen = np.stack([_sensed(sensors[name], h, back, every) for name in _SENSORS], axis=1)
     bus = back ** round(config.controllers.bus_delay_s / h) * _held(every, back)
     return bus[:, None, None] * answer(frequencies_radps) @ (seen[:, :, None] * motion)
+
+
+def _states(a: Array, b: Array, z: Response) -> Response:
+    """Return (z I - A)^-1 B for each z. One Schur form of A serves all z, which saves a factorisation for each."""
+    triangle, vectors = scipy.linalg.schur(a, output="complex")
+    inputs, found = vectors.conj().T @ b, np.empty((len(a), len(z), b.shape[1]), np.complex128)
+    for row in reversed(range(len(a))):
+        rest = np.tensordot(triangle[row, row + 1 :], found[row + 1 :], axes=1)
+        found[row] = (inputs[row] + rest) / (z - triangle[row, row])[:, None]
+    return np.moveaxis(np.tensordot(vectors, found, axes=1), 0, 1)
 
 
 def _held(steps: int, back: Response) -> Response:
@@ -310,10 +319,9 @@ def _answer(
     form = linear_controller(given, setup, rolling.speed_mps)
 
     def response(frequencies_radps: Array) -> Response:
-        z = np.exp(1j * frequencies_radps * setup.timestep_s)[:, None, None]
+        z = np.exp(1j * frequencies_radps * setup.timestep_s)
         answer = np.zeros((len(z), len(LOOPS), len(SIGNALS)), np.complex128)
-        states = np.linalg.solve(z * np.eye(len(form.a)) - form.a, np.asarray(form.b[:, 1:], dtype=np.complex128))
-        answer[:, :, :1] = form.c @ states + form.d[:, 1:]
+        answer[:, :, :1] = form.c @ _states(form.a, form.b[:, 1:], z) + form.d[:, 1:]
         return answer
 
     return response
