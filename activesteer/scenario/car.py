@@ -8,6 +8,7 @@ or take minutes. A car needs much less, so this module limits the sizes and name
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
 import os
@@ -16,7 +17,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -92,30 +93,54 @@ def model_files(mjcf: Path) -> dict[str, bytes]:
         if (name := _name(path, mjcf)) in files:
             continue
         files[name] = read_bytes(path, ModelError, _MAX_XML_BYTES)
-        root = _parsed(files[name], name)
-        if path == mjcf and root.tag != "mujoco":
+        read = _contents(files[name], name)
+        if path == mjcf and read.root != "mujoco":
             raise ModelError("is not an MJCF file: its first element is not <mujoco>", file=name)
-        for element, copies, depth in _walk(root):
-            elements += 1
-            if elements > _MAX_ELEMENTS or depth > _MAX_DEPTH or len(files) > _MAX_FILES:
-                raise ModelError(
-                    f"the model has more than {_MAX_ELEMENTS} elements, {_MAX_DEPTH} levels or {_MAX_FILES} files",
-                    file=name,
-                )
-            if element.tag == "include":
-                waiting.append(_included(element, path, mjcf, name))
-            else:
-                _check(element, copies, name)
-                # Of a mesh, texture, height field or skin.
-                assets |= {file: name for key, file in element.items() if key.startswith("file") and file}
-            if element.tag == "compiler":
-                folders |= {mjcf.parent / element.get(key, "") for key in ("meshdir", "texturedir", "assetdir")}
+        elements += read.elements
+        if elements > _MAX_ELEMENTS or len(files) > _MAX_FILES:
+            raise _too_large(name)
+        waiting += [_included(file, path, mjcf, name) for file in read.included]
+        assets |= dict.fromkeys(read.assets, name)
+        folders |= {mjcf.parent / folder for folder in read.folders}
     for file, name in assets.items():
         for path in (folder / asked for folder in folders for asked in (file, Path(file).name)):
             if os.path.lexists(path):
                 found = _check_asset(path, name)
                 files[f"{_name(path, mjcf)}.sha256"] = hashlib.sha256(found).hexdigest().encode()
     return files
+
+
+class _Contents(NamedTuple):
+    root: str  # tag of the first element
+    elements: int
+    included: tuple[str, ...]  # files
+    assets: tuple[str, ...]  # files of meshes, textures, height fields and skins
+    folders: tuple[str, ...]  # folders of assets
+
+
+@functools.lru_cache(maxsize=32)  # a study reads the same few files for each of its runs
+def _contents(data: bytes, name: str) -> _Contents:
+    """Read one file of a model, and check the sizes that it requests from the engine."""
+    root, elements = _parsed(data, name), 0
+    included, assets, folders = [], [], []
+    for element, copies, depth in _walk(root):
+        elements += 1
+        if elements > _MAX_ELEMENTS or depth > _MAX_DEPTH:
+            raise _too_large(name)
+        if element.tag == "include":
+            included.append(element.get("file", ""))
+        else:
+            _check(element, copies, name)
+            assets += [file for key, file in element.items() if key.startswith("file") and file]
+        if element.tag == "compiler":
+            folders += [element.get(key, "") for key in ("meshdir", "texturedir", "assetdir")]
+    return _Contents(root.tag, elements, tuple(included), tuple(assets), tuple(folders))
+
+
+def _too_large(name: str) -> ModelError:
+    return ModelError(
+        f"the model has more than {_MAX_ELEMENTS} elements, {_MAX_DEPTH} levels or {_MAX_FILES} files", file=name
+    )
 
 
 def _name(path: Path, mjcf: Path) -> str:
@@ -154,8 +179,7 @@ def _numbers(text: str) -> list[float]:
     return [float(found) for found in _NUMBER.findall(text)]
 
 
-def _included(element: ElementTree.Element, path: Path, mjcf: Path, name: str) -> Path:
-    file = element.get("file", "")
+def _included(file: str, path: Path, mjcf: Path, name: str) -> Path:
     for folder in (mjcf.parent, path.parent):
         if is_file(folder / file):
             return folder / file

@@ -126,7 +126,7 @@ def round_trip(
     """Return the return ratio M of the demands, where u = M u closes the loop."""
     h, config = car.timestep_s, scenario.car.config
     back = np.exp(-1j * frequencies_radps * h)  # one step
-    states = _states(car.a, car.b[:, 1:], 1.0 / back)
+    states = _states(car.a, car.b[:, 1:], back.conj())
     rows = {name: car.c[index] for index, name in enumerate(OUTPUTS)}
     # The accelerometer rolls with the body. All signals but the yaw rate belong to the start of the step.
     leaning = rows["ay_mps2"] + GRAVITY_MPS2 * rows["roll_rad"]
@@ -143,7 +143,7 @@ def round_trip(
 
 def _states(a: Array, b: Array, z: Response) -> Response:
     """Return (z I - A)^-1 B for each z. One Schur form of A serves all z, which saves a factorisation for each."""
-    triangle, vectors = scipy.linalg.schur(a, output="complex")
+    triangle, vectors, *_ = scipy.linalg.schur(a, output="complex")
     inputs, found = vectors.conj().T @ b, np.empty((len(a), len(z), b.shape[1]), np.complex128)
     for row in reversed(range(len(a))):
         rest = np.tensordot(triangle[row, row + 1 :], found[row + 1 :], axes=1)
