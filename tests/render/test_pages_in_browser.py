@@ -200,6 +200,32 @@ def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
     assert told == ["0.00", "\N{MINUS SIGN}0.01", "0.00", "\N{EN DASH}", "\N{MINUS SIGN}1235"]
 
 
+# Texts of the fields of a chart: ordinate and baseline, middle of the field [px], and colours of both.
+FIELDS = """() => {
+  const chart = drawn.find((each) => each.panel.areas.some((area) => area.shade != null) && each.panel.notes.length);
+  const texts = [], { ctx } = chart.plot, told = ctx.fillText;
+  ctx.fillText = (text, x, y) => texts.push([text, y, ctx.textBaseline]);
+  chart.draw(chart.plot);
+  ctx.fillText = told;
+  return chart.panel.areas.map(({ low, high, shade }, i) => {
+    const [text, , value, colour] = chart.panel.notes[i], [, y, baseline] = texts.find(([each]) => each === value);
+    const middle = chart.plot.valToPos((low[0] + high[0]) / 2, "y", true);
+    return { y, baseline, middle, colours: [scaleColour(shade), colour] };
+  });
+}"""
+
+
+@pytest.mark.slow
+def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path):
+    page = shown(of_study(tmp_path), **PHONE)
+    fields = page.evaluate(FIELDS)
+    assert len(fields) == 6
+    for field in fields:
+        assert field["baseline"] == "middle"
+        assert abs(field["y"] - field["middle"]) <= 3.0
+        assert contrast(*field["colours"]) >= 4.5
+
+
 @pytest.mark.slow
 def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)

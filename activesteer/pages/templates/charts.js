@@ -228,7 +228,9 @@ class Chart {
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
       ctx.fillStyle = colour || paint.ink;
-      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + 3 * dpr); continue; }
+      // The value of a field is in its middle; another note hangs below its point.
+      ctx.textBaseline = colour ? "middle" : "top";
+      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + (colour ? 1 : 3) * dpr); continue; }
       // A point in a row has its value beside it, where there is room.
       const before = px(x) > bbox.left + 0.8 * bbox.width;
       ctx.textAlign = before ? "right" : "left"; ctx.textBaseline = "middle";

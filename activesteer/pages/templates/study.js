@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24;
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -88,7 +88,7 @@ function heat(metric, { axes, maps }) {
       if (value === null) return;
       const shade = (value - low) / (high - low), [left, right] = endsAt(axes[0], i), [below, above] = endsAt(axes[1], j);
       areas.push({ x: [left, right], low: [below, below], high: [above, above], label: "", colour: "", alpha: 1, edge: "", shade });
-      if (map.length <= FIELDS) notes.push([(left + right) / 2, below + 0.7 * (above - below), short(value), shade > 0.6 ? "#000000" : "#ffffff"]);
+      if (map.length <= FIELDS) notes.push([(left + right) / 2, (below + above) / 2, short(value), shade > DARK_BELOW ? "#000000" : "#ffffff"]);
     }));
     return panelOf(x, y, { title: DATA.controllers[c], areas, notes, x_levels, y_levels, x_range, y_range });
   });
