@@ -51,7 +51,7 @@ const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
 // Limits of a vertical axis, with some room, and no closer than `least`.
 function padded(low, high, least) {
   if (low == null) return [0, least];
-  const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+  const half = 0.55 * Math.max(high - low, least), middle = (low + high) / 2;
   return [middle - half, middle + half];
 }
 
