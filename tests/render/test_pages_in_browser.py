@@ -194,6 +194,17 @@ def test_many_plots_stand_four_in_a_row_unless_they_are_over_time(shown, tmp_pat
     assert len(set(tops)) == rows
 
 
+def test_plots_in_a_row_stand_at_one_height_below_names_of_any_length(shown, tmp_path):
+    names = ["toe", "a name so long that it takes more than one line above its plot, and " * 3]
+    panels = [Panel("x [m]", "y [m]", [Curve([0.0, 1.0], [0.0, 1.0])], name) for name in names]
+    sections = [Section("Part", pictures=[Picture("", panels)])]
+    page = shown(write_page(Page("all", "Rows", [], sections), tmp_path / "r.html"), **DESK)
+    heads = page.locator("figcaption").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().height)")
+    tops = page.locator(".uplot").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert heads[0] < heads[1]
+    assert tops[0] == tops[1]
+
+
 def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     told = page.evaluate("[-0.001, -0.01, 0, null, -1234.5].map(shown)")
