@@ -238,6 +238,31 @@ def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path
 
 
 @pytest.mark.slow
+def test_the_extreme_runs_of_a_study_are_listed_with_their_factors(shown, tmp_path):
+    page = shown(of_study(tmp_path), **DESK)
+    table = page.locator("section.part", has_text="Largest and smallest magnitudes").locator("table").last
+    heads = table.locator("th").evaluate_all("(all) => all.map((one) => one.textContent)")
+    place = heads.index("speed [km/h]")
+    values = table.locator(f"tbody tr td:nth-child({place + 1})").evaluate_all(
+        "(all) => all.map((one) => one.textContent)"
+    )
+    assert set(values) == {"70", "80"}
+
+
+@pytest.mark.slow
+def test_a_legend_shows_a_filled_area_as_an_area(shown, tmp_path):
+    x = np.linspace(0.0, 1.0, 5)
+    panel = Panel(
+        "x [m]", "y [m]", [Curve(x, x, "measured", "#777777")], areas=[Area(x, -1.0, 1.0, "tolerance", "#777777")]
+    )
+    page = shown(
+        write_page(Page("all", "Area", [], [Section(pictures=[Picture("", [panel])])]), tmp_path / "a.html"), **DESK
+    )
+    heights = page.locator(".swatch path").evaluate_all("(paths) => paths.map((path) => path.getBBox().height)")
+    assert heights == [0, 5]
+
+
+@pytest.mark.slow
 def test_pointing_at_a_chart_tells_values_and_a_name_hides_its_curve(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     figure = page.locator("figure").first

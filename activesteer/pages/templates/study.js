@@ -196,8 +196,11 @@ function drawGroup() {
   }
   if (!few) { begin("Parallel coordinates"); parallel(metric, rows); }
   begin("Largest and smallest magnitudes");
-  tableOf(["controller", "run", axisOf(metric), "command to drive and replay it"],
-    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])), true);
+  // The row of each run that the page has, because a page of many runs has some of them only.
+  const place = new Map(rows.map((i) => [DATA.rows.run[i], i]));
+  const driven = ({ key }, run) => { const value = DATA.rows.factors[key][place.get(run)]; return typeof value === "number" ? short(value) : String(value ?? "-"); };
+  tableOf(["controller", "run", axisOf(metric), ...factors.map(axisOf), "command to drive and replay it"],
+    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), ...factors.map((factor) => driven(factor, run)), replayLine(command)])), true);
   const constant = [], others = [];
   for (const other of DATA.metrics) {
     if (!DATA.by_group[group][other.name]) continue;
