@@ -228,6 +228,7 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     assert top.count("stays under control") == 2
     better = "\N{CHECK MARK} better"
     assert better not in top  # nothing is better or worse than a run that is lost
+    assert "Small: difference from none, rated only between complete runs under control." in top
     for run in runs.values():
         run.metadata["overrides"] = {"maneuver.speed_kmh": 95}
         run.metrics["sideslip_peak_rad"] = 0.1
