@@ -288,7 +288,7 @@
         ...(covers ? ["shaded: width of the bodies"] : []),
         ...(this.data.patches.length ? [`blue: friction ${[...new Set(this.data.patches.map(({ mu }) => mu))].slice(0, 3).join(", ")}`] : []),
         ...new Set(this.data.obstacles.map(({ text }) => `bordered: ${text}`)),
-        ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
+        ...(factors ? [factors[0] === factors[2] ? `wheels turned ${factors[0]} times as far` : `front wheels turned ${factors[0]} times as far, rear wheels ${factors[2]} times`] : []),
       ].join(", ");
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
