@@ -238,6 +238,21 @@ def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path
 
 
 @pytest.mark.slow
+def test_links_and_sliders_of_a_phone_are_as_large_as_a_finger(shown, tmp_path):
+    time_s = np.linspace(0.0, 1.0, 5)
+    picture = Picture("", [Panel("time [s]", "y [m]", [Curve(time_s, time_s)])])
+    sections = [Section(name, pictures=[picture]) for name in ("A", "B", "C")]
+    page = shown(write_page(Page("all", "Touch", [], sections), tmp_path / "t.html"), **PHONE)
+    boxes = page.locator(".jump a").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().toJSON())")
+    assert len(boxes) == 4
+    assert boxes[0]["width"] >= 40.0  # Top
+    assert min(box["height"] for box in boxes) >= 40.0
+    slider = page.locator("input.time").bounding_box()
+    assert slider
+    assert slider["height"] >= 40.0
+
+
+@pytest.mark.slow
 def test_the_extreme_runs_of_a_study_are_listed_with_their_factors(shown, tmp_path):
     page = shown(of_study(tmp_path), **DESK)
     table = page.locator("section.part", has_text="Largest and smallest magnitudes").locator("table").last
