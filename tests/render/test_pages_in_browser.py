@@ -238,6 +238,20 @@ def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("value", "told"), [("of", True), ("0 * of", False)])
+def test_a_map_names_a_third_factor_that_differs_between_its_fields(shown, tmp_path, value, told):
+    page = shown(of_study(tmp_path), **DESK)
+    page.evaluate(f"""() => {{
+      const [{{ key }}] = DATA.factors, values = DATA.rows.factors[key].map((of) => {value});
+      DATA.factors.push({{ key: "third", label: "mass factor", unit: "-", numeric: true, levels: null }});
+      DATA.rows.factors.third = values;
+      for (const found of Object.values(DATA.by_group[0])) found.heat = null;
+      drawAll();
+    }}""")
+    assert ("The fields also differ in mass factor." in page.inner_text("#study")) == told
+
+
+@pytest.mark.slow
 def test_links_and_sliders_of_a_phone_are_as_large_as_a_finger(shown, tmp_path):
     time_s = np.linspace(0.0, 1.0, 5)
     picture = Picture("", [Panel("time [s]", "y [m]", [Curve(time_s, time_s)])])

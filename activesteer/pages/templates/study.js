@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, MIXED = 0.25, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -70,6 +70,16 @@ function binned(rows, values) {
     field[0] += values[i]; field[1]++;
   }
   return { axes, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
+}
+
+// Further factors whose mean differs between the fields by more than a share of their range: the map shows their effect, too.
+function mixed(axes, rows) {
+  return varied(rows).filter(({ key, numeric }) => numeric && !axes.some((axis) => axis.key === key)).filter(({ key }) => {
+    const fields = new Map(), known = rows.filter((i) => DATA.rows.factors[key][i] != null), of = (i) => DATA.rows.factors[key][i];
+    for (const i of known) { const field = axes.map((axis) => axis.place(i)).join(); fields.set(field, [...(fields.get(field) ?? []), of(i)]); }
+    const [least, most] = endsOf([...fields.values()].map((own) => own.reduce((a, b) => a + b) / own.length)), [low, high] = endsOf(known.map(of));
+    return most - least > MIXED * (high - low);
+  });
 }
 
 function heat(metric, { axes, maps }) {
@@ -189,7 +199,11 @@ function drawGroup() {
     show("paired", varied(pairs).map((factor) => scatter(factor, `difference: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]), joined)));
   }
   const map = found.heat || binned(rows, values);
-  if (map) { begin("Mean over two factors"); heat(metric, map); }
+  if (map) {
+    const others = found.heat ? [] : mixed(map.axes, rows).map(({ label }) => label);
+    begin("Mean over two factors", others.length ? `The fields also differ in ${others.join(", ")}.` : "");
+    heat(metric, map);
+  }
   if (found.indices.length) {
     begin("Sensitivity", "Points are indices, lines their 95 % confidence. S1: share of the variance due to the factor alone; ST: share with all its interactions; mu*: mean magnitude of the change over the whole range of the factor, in the unit of the metric.");
     sensitivity(metric, found.indices);
