@@ -32,6 +32,8 @@ _BASE: Final = 0.73
 LARGEST_SHARE: Final = 0.1
 """Largest fraction of the frame that gauges may cover."""
 _SMALLEST: Final = 0.4
+_PLAIN: Final = str.maketrans("\N{MINUS SIGN}\N{EN DASH}\N{SUPERSCRIPT TWO}\N{MULTIPLICATION SIGN}", "--2x")
+"""Characters for which Pillow's own font has no glyph, and would draw a box, with those drawn instead."""
 _WIDEST: Final = {"speed_mps": "188.8", "sideslip_rad": "-18.8", "steering_wheel_rad": "-188"}
 
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
@@ -65,7 +67,8 @@ class Gauges:
 
     def __init__(self, panes: Dialled, title: str, size: tuple[int, int], note: str = "") -> None:
         """Choose the fonts and the values of the gauges."""
-        self._panes, self._title, self._note, self._size = panes, title, note, size
+        self._panes, self._size = panes, size
+        self._title, self._note = title.translate(_PLAIN), note.translate(_PLAIN)
         self._every = [dial for pane in panes for dial in pane]
         lines = [line for panel in panels_in(FILM) for line in panel.lines_in(FILM)]
         self._readings = [quantity_of(line.channel) for line in lines if any(dial.has(line) for dial in self._every)]
@@ -120,7 +123,7 @@ class Gauges:
         _write(layer, (1.4 * gap, base), dial.label, colour, self._text)
         for x, end, reading in zip(self._columns[:-1], self._columns[1:], self._readings, strict=True):
             found = dial.value(reading.channel, time_s)
-            value = reading.value_text(found).replace("-", "\N{MINUS SIGN}") if math.isfinite(found) else "-"
+            value = reading.value_text(found) if math.isfinite(found) else "-"
             unit_at = end - 2.0 * gap - self._small.getlength(reading.unit.name)
             _write(layer, (x, base), reading.short, _GREY, self._small)
             _write(layer, (unit_at - 0.7 * gap, base), value, _WHITE, self._text, "rs")
@@ -159,8 +162,8 @@ def _write(
     face: Font,
     anchor: str = "ls",
 ) -> None:
-    """Draw a label at a position [pixels]."""
-    ImageDraw.Draw(layer).text(place, text, colour, face, anchor)
+    """Draw a label at a position [pixels], in characters that the font has."""
+    ImageDraw.Draw(layer).text(place, text.translate(_PLAIN), colour, face, anchor)
 
 
 @lru_cache(maxsize=100)

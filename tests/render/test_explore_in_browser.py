@@ -29,6 +29,8 @@ MAIN = "from activesteer.commands.cli import main; raise SystemExit(main())"
 COMMAND = [sys.executable, "-c", MAIN, "explore", "--json"]
 LAST_YAW_RATE = """() => [...activesteer.runs.values()].map((run) =>
   run.plots.panels.find((panel) => panel.title === "Yaw rate").series[0].values.at(-1))"""
+SIZES_OF_SLIDERS = """() => Math.min(...[...document.querySelectorAll("#sliders input")]
+  .filter((part) => part.checkVisibility()).map((part) => part.getBoundingClientRect().height))"""
 DONE = "#state:has-text('driven in')"
 LIMIT_MS = 60_000
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -173,6 +175,8 @@ def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str
         page.select_option("#group", "ARS")
         assert gain.is_visible()
         page.select_option("#group", "manoeuvre")
+        assert page.evaluate(SIZES_OF_SLIDERS) >= 40.0
+        assert page.evaluate(BOX, "theme")["width"] >= 40.0
     page.locator("#curves").scroll_into_view_if_needed()
     page.evaluate("scrollBy(0, 400)")
     sliders, curves = page.evaluate(BOX, "tuning"), page.evaluate(BOX, "curves")

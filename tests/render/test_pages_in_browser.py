@@ -194,10 +194,101 @@ def test_many_plots_stand_four_in_a_row_unless_they_are_over_time(shown, tmp_pat
     assert len(set(tops)) == rows
 
 
+def test_plots_in_a_row_stand_at_one_height_below_names_of_any_length(shown, tmp_path):
+    names = ["toe", "a name so long that it takes more than one line above its plot, and " * 3]
+    panels = [Panel("x [m]", "y [m]", [Curve([0.0, 1.0], [0.0, 1.0])], name) for name in names]
+    sections = [Section("Part", pictures=[Picture("", panels)])]
+    page = shown(write_page(Page("all", "Rows", [], sections), tmp_path / "r.html"), **DESK)
+    heads = page.locator("figcaption").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().height)")
+    tops = page.locator(".uplot").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert heads[0] < heads[1]
+    assert tops[0] == tops[1]
+
+
 def test_a_value_that_rounds_to_zero_has_no_sign(shown, tmp_path):
     page = shown(every_panel(tmp_path), **DESK)
     told = page.evaluate("[-0.001, -0.01, 0, null, -1234.5].map(shown)")
     assert told == ["0.00", "\N{MINUS SIGN}0.01", "0.00", "\N{EN DASH}", "\N{MINUS SIGN}1235"]
+
+
+# Texts of the fields of a chart: ordinate and baseline, middle of the field [px], and colours of both.
+FIELDS = """() => {
+  const chart = drawn.find((each) => each.panel.areas.some((area) => area.shade != null) && each.panel.notes.length);
+  const texts = [], { ctx } = chart.plot, told = ctx.fillText;
+  ctx.fillText = (text, x, y) => texts.push([text, y, ctx.textBaseline]);
+  chart.draw(chart.plot);
+  ctx.fillText = told;
+  return chart.panel.areas.map(({ low, high, shade }, i) => {
+    const [text, , value, colour] = chart.panel.notes[i], [, y, baseline] = texts.find(([each]) => each === value);
+    const middle = chart.plot.valToPos((low[0] + high[0]) / 2, "y", true);
+    return { y, baseline, middle, colours: [scaleColour(shade), colour] };
+  });
+}"""
+
+
+@pytest.mark.slow
+def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path):
+    page = shown(of_study(tmp_path), **PHONE)
+    fields = page.evaluate(FIELDS)
+    assert len(fields) == 6
+    for field in fields:
+        assert field["baseline"] == "middle"
+        assert abs(field["y"] - field["middle"]) <= 3.0
+        assert contrast(*field["colours"]) >= 4.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("value", "told"), [("of", True), ("0 * of", False)])
+def test_a_map_names_a_third_factor_that_differs_between_its_fields(shown, tmp_path, value, told):
+    page = shown(of_study(tmp_path), **DESK)
+    page.evaluate(f"""() => {{
+      const [{{ key }}] = DATA.factors, values = DATA.rows.factors[key].map((of) => {value});
+      DATA.factors.push({{ key: "third", label: "mass factor", unit: "-", numeric: true, levels: null }});
+      DATA.rows.factors.third = values;
+      for (const found of Object.values(DATA.by_group[0])) found.heat = null;
+      drawAll();
+    }}""")
+    assert ("The fields also differ in mass factor." in page.inner_text("#study")) == told
+
+
+@pytest.mark.slow
+def test_links_and_sliders_of_a_phone_are_as_large_as_a_finger(shown, tmp_path):
+    time_s = np.linspace(0.0, 1.0, 5)
+    picture = Picture("", [Panel("time [s]", "y [m]", [Curve(time_s, time_s)])])
+    sections = [Section(name, pictures=[picture]) for name in ("A", "B", "C")]
+    page = shown(write_page(Page("all", "Touch", [], sections), tmp_path / "t.html"), **PHONE)
+    boxes = page.locator(".jump a").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().toJSON())")
+    assert len(boxes) == 4
+    assert boxes[0]["width"] >= 40.0  # Top
+    assert min(box["height"] for box in boxes) >= 40.0
+    slider = page.locator("input.time").bounding_box()
+    assert slider
+    assert slider["height"] >= 40.0
+
+
+@pytest.mark.slow
+def test_the_extreme_runs_of_a_study_are_listed_with_their_factors(shown, tmp_path):
+    page = shown(of_study(tmp_path), **DESK)
+    table = page.locator("section.part", has_text="Largest and smallest magnitudes").locator("table").last
+    heads = table.locator("th").evaluate_all("(all) => all.map((one) => one.textContent)")
+    place = heads.index("speed [km/h]")
+    values = table.locator(f"tbody tr td:nth-child({place + 1})").evaluate_all(
+        "(all) => all.map((one) => one.textContent)"
+    )
+    assert set(values) == {"70", "80"}
+
+
+@pytest.mark.slow
+def test_a_legend_shows_a_filled_area_as_an_area(shown, tmp_path):
+    x = np.linspace(0.0, 1.0, 5)
+    panel = Panel(
+        "x [m]", "y [m]", [Curve(x, x, "measured", "#777777")], areas=[Area(x, -1.0, 1.0, "tolerance", "#777777")]
+    )
+    page = shown(
+        write_page(Page("all", "Area", [], [Section(pictures=[Picture("", [panel])])]), tmp_path / "a.html"), **DESK
+    )
+    heights = page.locator(".swatch path").evaluate_all("(paths) => paths.map((path) => path.getBBox().height)")
+    assert heights == [0, 5]
 
 
 @pytest.mark.slow

@@ -355,3 +355,12 @@ def test_printed_plots_fit_the_paper(open_page):
     box = plot(page, "Yaw rate").locator(".uplot").bounding_box()
     assert box
     assert box["width"] > 400.0  # as before
+
+
+def test_labels_of_a_signal_at_rest_stay_clear_of_the_corner(open_page):
+    page = open_page(**DESK)
+    ends = page.evaluate("padded(0, 0, 2)")
+    # A label at the very end of the axis would meet the first label of the abscissa.
+    assert ends[0] < -1.0
+    assert ends[1] > 1.0
+    assert page.evaluate("padded(0, 10, 2)") == pytest.approx([-0.5, 10.5])

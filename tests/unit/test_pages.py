@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from activesteer.analysis.report import report_page
 from activesteer.pages import _environment, render_page
-from activesteer.pages.model import Page, Table, picture_values
+from activesteer.pages.model import Page, Section, Table, picture_values
 from activesteer.plotting import Curve, Panel, Picture, draw
 from tests.contrast import contrast
 from tests.reference.chrono.comparison import Comparison
@@ -101,6 +101,11 @@ def test_a_figure_over_whole_numbers_has_whole_ticks(runs: list[int]):
     (axis,) = draw(Picture("", [Panel("runs", "margin [-]", [Curve(runs, [1.0] * len(runs))])])).axes
     low, high = axis.get_xlim()
     assert [tick for tick in axis.get_xticks() if low <= tick <= high] == runs
+
+
+def test_a_spread_has_its_sign():
+    table = Table("", ["quantity", "value"], [["angle", "-94.0 +- 1.3"]])
+    assert "\N{MINUS SIGN}94.0 \N{PLUS-MINUS SIGN} 1.3" in render_page(Page("a", "A", [], [Section(tables=[table])]))
 
 
 def test_a_column_of_the_controller_none_is_no_column_of_numbers():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
 from activesteer.drawing import wheel_angles
+from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
@@ -57,6 +58,8 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
     """Return the plots of a group as JSON values."""
     grid = time_grid([run.recording.time_s for run in group.runs])
     panels = [shown for panel in panels_in(view) if (shown := _panel(panel, view, group.runs, grid))["series"]]
+    stands = view == REPORT and all(_stands(run.recording) for run in group.runs)
+    zero = [shown["title"] for shown in panels if stands and _is_zero(shown)]
     return {
         "name": group.name,
         "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
@@ -72,11 +75,25 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
             }
             for run in group.runs
         ],
-        "panels": panels,
+        "panels": [shown for shown in panels if shown["title"] not in zero],
+        "zero": zero,
         "marks": [{"time_s": at_s, "text": text} for at_s, text in _marks(group)],
         "slip_limit_deg": _slip_limit_deg(group),
         "track": _track(group, grid),
     }
+
+
+def _stands(recording: Recording) -> bool:
+    """Return whether a car never moves faster than at a walk."""
+    with suppress(RecordingError):
+        return bool(np.nanmax(np.abs(recording["speed_mps"]), initial=0.0) < SLOWEST_MPS)
+    return False
+
+
+def _is_zero(panel: Mapping[str, Any]) -> bool:
+    """Return whether all lines of a panel are zero, seen on its shortest axis."""
+    values = (value for line in panel["series"] for value in line["values"] if value is not None)
+    return all(abs(value) < 1e-3 * panel["min_span"] for value in values)
 
 
 def _marks(group: Group) -> list[tuple[float, str]]:

@@ -11,7 +11,7 @@ from operator import neg
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from activesteer.analysis.claims.scorecard import Judged, Scorecard, Verdict, number_lines
 from activesteer.analysis.harm import LOST, is_controlled, kept, losses, shown
@@ -168,9 +168,13 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
         '<span class="better">\N{CHECK MARK} better</span>, <span class="worse">\N{BALLOT X} worse</span> than {}; '
         "\N{ALMOST EQUAL TO} a difference that neither a driver nor a sensor could tell."
     ).format(names[0])
-    marked = any(figure["change"] is not Change.OTHER for each in found for figure in each["figures"])
+    figures = [figure for each in found for figure in each["figures"]]
+    if all(figure["change"] is Change.OTHER for figure in figures):
+        compares = any(figure["difference"] not in ("", "0") for figure in figures)
+        rated = "" if all(map(_is_judged, group.runs)) else ", rated only between complete runs under control"
+        note = escape(f"Small: difference from {names[0]}{rated}.") if compares else Markup()
     heads = ["Run", *(["Result"] if judged else []), *titles]
-    compared = Table("", heads, rows, kind="results", numbers=len(titles), note=note if marked else "")
+    compared = Table("", heads, rows, kind="results", numbers=len(titles), note=note)
     first = Section(title, told_first, [compared] if len(heads) > 1 else [], anchor=anchor)
     details = [_claim(item, anchor) for item in card.judged]
     claims = Section("What the paper claims", points=details, level=3, kind="claims")

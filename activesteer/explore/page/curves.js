@@ -6,7 +6,7 @@ const HEIGHT = 170, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX 
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
-  const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+  const half = 0.55 * Math.max(high - low, least), middle = (low + high) / 2;
   return [middle - half, middle + half];
 }
 

@@ -51,7 +51,7 @@ const lineWidth = (run) => Math.max(1.5, 2.6 - 0.4 * run);
 // Limits of a vertical axis, with some room, and no closer than `least`.
 function padded(low, high, least) {
   if (low == null) return [0, least];
-  const half = Math.max(0.55 * (high - low), least / 2), middle = (low + high) / 2;
+  const half = 0.55 * Math.max(high - low, least), middle = (low + high) / 2;
   return [middle - half, middle + half];
 }
 
@@ -60,12 +60,14 @@ const DARK = matchMedia("(prefers-color-scheme: dark)"), NARROW = matchMedia("(m
 const drawn = [];
 
 const POINTS = { o: "M13 3a1 1 0 1 0 2 0a1 1 0 1 0-2 0z", D: "M14 1.5l1.5 1.5-1.5 1.5-1.5-1.5z", x: "M11.5 .5l5 5m0-5l-5 5" };
-function swatchOf(colour, dashes, marker = "") {
+// A swatch of a line, of a point, or of an area with the opacity `filled`.
+function swatchOf(colour, dashes, marker = "", filled = null) {
   const swatch = document.createElementNS(SVG, "svg");
   swatch.setAttribute("class", "swatch");
   swatch.setAttribute("viewBox", "0 0 28 6");
   swatch.style.setProperty("--run", colour);
   const line = swatch.appendChild(document.createElementNS(SVG, "path"));
+  if (filled != null) { line.setAttribute("d", "M.5 .5h27v5h-27z"); Object.assign(line.style, { fill: colour, fillOpacity: filled, strokeWidth: 1 }); return swatch; }
   line.setAttribute("d", marker ? POINTS[marker] ?? POINTS.o : "M0 3h28");
   if (marker) line.style.fill = colour; else line.setAttribute("stroke-dasharray", dashes.join(" "));
   return swatch;
@@ -228,7 +230,9 @@ class Chart {
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
       ctx.fillStyle = colour || paint.ink;
-      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + 3 * dpr); continue; }
+      // The value of a field is in its middle; another note hangs below its point.
+      ctx.textBaseline = colour ? "middle" : "top";
+      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + (colour ? 1 : 3) * dpr); continue; }
       // A point in a row has its value beside it, where there is room.
       const before = px(x) > bbox.left + 0.8 * bbox.width;
       ctx.textAlign = before ? "right" : "left"; ctx.textBaseline = "middle";
@@ -320,10 +324,10 @@ function drawPicture(box, picture, place) {
   if (names.length) legend = own;
   bar.classList.toggle("shared", shared);
   Object.assign(picture, { place, hidden });
-  const entry = (label, colour, dashes, marker) => {
+  const entry = (label, colour, dashes, marker, filled = null) => {
     if (!label || seen.has(label)) return;
     seen.add(label);
-    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes, marker), label);
+    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes, marker, filled), label);
     button.addEventListener("click", () => {
       const hide = !hidden.delete(label);
       if (hide) hidden.add(label);
@@ -336,7 +340,7 @@ function drawPicture(box, picture, place) {
     if (panel.legend && !seen.has(panel.legend)) bar.append(element("span", { class: "scale" }, panel.legend));
     seen.add(panel.legend);
     for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || []).map((length) => 2 * length), curve.dashes ? "" : curve.marker);
-    for (const area of panel.areas) entry(area.label, inkOf(area.colour), []);
+    for (const area of panel.areas) entry(area.label, inkOf(area.colour), [], "", area.alpha || null); // an area without a filling is its edge
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }
   if (picture.scale) {

@@ -17,6 +17,8 @@
       this.toolbar(bar);
       if (data.track) this.track = new Track(this, data.track);
       for (const panel of data.panels) this.plots.push(this.panel(panel));
+      const zero = data.zero.map((title) => title[0].toLowerCase() + title.slice(1));
+      if (zero.length) this.box.after(element("p", { class: "key quiet" }, `Zero throughout, at rest: ${zero.join(", ")}.`));
       new ResizeObserver(() => this.fit()).observe(this.box);
       this.zoom(null);
     }
@@ -288,7 +290,7 @@
         ...(covers ? ["shaded: width of the bodies"] : []),
         ...(this.data.patches.length ? [`blue: friction ${[...new Set(this.data.patches.map(({ mu }) => mu))].slice(0, 3).join(", ")}`] : []),
         ...new Set(this.data.obstacles.map(({ text }) => `bordered: ${text}`)),
-        ...(factors ? [`wheels turned ${[...new Set(factors)].join(" and ")} times as far`] : []),
+        ...(factors ? [factors[0] === factors[2] ? `wheels turned ${factors[0]} times as far` : `front wheels turned ${factors[0]} times as far, rear wheels ${factors[2]} times`] : []),
       ].join(", ");
       ctx.save();
       ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();

@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24;
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, MIXED = 0.25, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -72,6 +72,16 @@ function binned(rows, values) {
   return { axes, maps: sums.map((map) => map.map((line) => line.map(([sum, n]) => (n ? sum / n : null)))) };
 }
 
+// Further factors whose mean differs between the fields by more than a share of their range: the map shows their effect, too.
+function mixed(axes, rows) {
+  return varied(rows).filter(({ key, numeric }) => numeric && !axes.some((axis) => axis.key === key)).filter(({ key }) => {
+    const fields = new Map(), known = rows.filter((i) => DATA.rows.factors[key][i] != null), of = (i) => DATA.rows.factors[key][i];
+    for (const i of known) { const field = axes.map((axis) => axis.place(i)).join(); fields.set(field, [...(fields.get(field) ?? []), of(i)]); }
+    const [least, most] = endsOf([...fields.values()].map((own) => own.reduce((a, b) => a + b) / own.length)), [low, high] = endsOf(known.map(of));
+    return most - least > MIXED * (high - low);
+  });
+}
+
 function heat(metric, { axes, maps }) {
   const [low, high] = endsOf(maps.flat(2));
   if (constantIn(low, high)) {
@@ -88,7 +98,7 @@ function heat(metric, { axes, maps }) {
       if (value === null) return;
       const shade = (value - low) / (high - low), [left, right] = endsAt(axes[0], i), [below, above] = endsAt(axes[1], j);
       areas.push({ x: [left, right], low: [below, below], high: [above, above], label: "", colour: "", alpha: 1, edge: "", shade });
-      if (map.length <= FIELDS) notes.push([(left + right) / 2, below + 0.7 * (above - below), short(value), shade > 0.6 ? "#000000" : "#ffffff"]);
+      if (map.length <= FIELDS) notes.push([(left + right) / 2, (below + above) / 2, short(value), shade > DARK_BELOW ? "#000000" : "#ffffff"]);
     }));
     return panelOf(x, y, { title: DATA.controllers[c], areas, notes, x_levels, y_levels, x_range, y_range });
   });
@@ -189,15 +199,22 @@ function drawGroup() {
     show("paired", varied(pairs).map((factor) => scatter(factor, `difference: ${axisOf(metric)}`, pairs, (i) => values[i] - base.get(DATA.rows.sample[i]), joined)));
   }
   const map = found.heat || binned(rows, values);
-  if (map) { begin("Mean over two factors"); heat(metric, map); }
+  if (map) {
+    const others = found.heat ? [] : mixed(map.axes, rows).map(({ label }) => label);
+    begin("Mean over two factors", others.length ? `The fields also differ in ${others.join(", ")}.` : "");
+    heat(metric, map);
+  }
   if (found.indices.length) {
     begin("Sensitivity", "Points are indices, lines their 95 % confidence. S1: share of the variance due to the factor alone; ST: share with all its interactions; mu*: mean magnitude of the change over the whole range of the factor, in the unit of the metric.");
     sensitivity(metric, found.indices);
   }
   if (!few) { begin("Parallel coordinates"); parallel(metric, rows); }
   begin("Largest and smallest magnitudes");
-  tableOf(["controller", "run", axisOf(metric), "command to drive and replay it"],
-    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), replayLine(command)])), true);
+  // The row of each run that the page has, because a page of many runs has some of them only.
+  const place = new Map(rows.map((i) => [DATA.rows.run[i], i]));
+  const driven = ({ key }, run) => { const value = DATA.rows.factors[key][place.get(run)]; return typeof value === "number" ? short(value) : String(value ?? "-"); };
+  tableOf(["controller", "run", axisOf(metric), ...factors.map(axisOf), "command to drive and replay it"],
+    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), ...factors.map((factor) => driven(factor, run)), replayLine(command)])), true);
   const constant = [], others = [];
   for (const other of DATA.metrics) {
     if (!DATA.by_group[group][other.name]) continue;

@@ -21,6 +21,7 @@ from activesteer.analysis.report.run_page import key_figures, parameters, result
 from activesteer.analysis.tables import Change, difference_text, number
 from activesteer.core.metric_table import recorded_metric
 from activesteer.core.signals import Channel
+from activesteer.drawing.panels import EXPLORE, REPORT
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.recording import Recording
 from activesteer.road.course import CONE_RADIUS_M
@@ -228,12 +229,26 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     assert top.count("stays under control") == 2
     better = "\N{CHECK MARK} better"
     assert better not in top  # nothing is better or worse than a run that is lost
+    assert "Small: difference from none, rated only between complete runs under control." in top
     for run in runs.values():
         run.metadata["overrides"] = {"maneuver.speed_kmh": 95}
         run.metrics["sideslip_peak_rad"] = 0.1
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "Driven with speed 95 km/h (maneuver.speed_kmh) in place" in top
     assert better in top
+
+
+def test_signals_of_a_standing_car_that_are_zero_are_named_but_not_drawn():
+    def shown(view: str = REPORT, **channels: float) -> dict[str, Any]:
+        run = step_steer()
+        run.channels = {name: np.full_like(run.time_s, channels.get(name, 0.0)) for name in run.channels}
+        return plots(groups_of({"a": recording_of(run)})[0], view)
+
+    rest = shown(steering_wheel_rad=0.5)
+    assert {"Yaw rate", "Roll angle", "Speed"} <= set(rest["zero"])
+    assert [panel["title"] for panel in rest["panels"]] == ["Steering wheel angle", "Wheel load, lowest of four wheels"]
+    assert shown(speed_mps=10.0)["zero"] == []  # a car that moves straight ahead shows that it does
+    assert shown(EXPLORE)["zero"] == []  # there the next run may differ
 
 
 def test_claims_are_judged_where_the_three_systems_are_there(page):

@@ -50,6 +50,14 @@ def test_each_value_is_seen(change):
     assert where[:, 0].min() > 500
 
 
+def test_a_negative_value_has_a_flat_sign_and_a_title_no_character_without_a_glyph():
+    # Pillow's own font draws a box for a character that it lacks: the typographic minus, a raised 2.
+    sign = changed(drawn(recording(sideslip_rad=0.1)), drawn(recording(sideslip_rad=-0.1)))
+    assert 1 <= np.ptp(sign[:, 0]) + 1 <= 4
+    assert (drawn(recording(), title="5 m/s²") == drawn(recording(), title="5 m/s2")).all()
+    assert (drawn(recording(), title="\N{MINUS SIGN}4 %") == drawn(recording(), title="-4 %")).all()
+
+
 def test_car_that_stands_has_no_sideslip():
     stands = {"speed_mps": 0.0, "sideslip_rad": 0.1}
     assert (drawn(recording(**stands)) == drawn(recording(**(stands | {"sideslip_rad": 1.5})))).all()
