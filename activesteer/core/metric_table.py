@@ -280,12 +280,9 @@ METRICS: Final = {
         *_declare("", "yaw_rate_after_1000ms_share", "yaw_rate_after_1750ms_share", better=_SMALLER, unit=_PERCENT),
         *_declare(
             "", "ay_overshoot", "roll_overshoot", "sideslip_overshoot", "braking_efficiency", "wheel_slip_max",
-            "added_angles_opposite_share", unit=_PERCENT,
+            "added_angles_opposite_share", "friction_utilisation_max", "friction_utilisation_mean", unit=_PERCENT,
         ),
-        *_declare(
-            "", "friction_utilisation_max", "friction_utilisation_mean", "yaw_rate_peak_gain_ratio", "coherence_min",
-            "added_angles_correlation",
-        ),
+        *_declare("", "yaw_rate_peak_gain_ratio", "coherence_min", "added_angles_correlation"),
         *_declare("", CONES_HIT, CONES_MISSED, better=_SMALLER, form=Form.COUNT),
         *_declare("", STAYS_IN_LANES, form=Form.YES_OR_NO),
     )

@@ -22,7 +22,7 @@ from tests.raising import raises
         ("speed_end_mps", "final speed", "km/h", 3.6),
         ("yaw_rate_response_time_s", "yaw rate response time", "s", 1.0),
         ("ay_overshoot", "lateral acceleration overshoot", "%", 100.0),
-        ("friction_utilisation_max", "largest friction utilisation", "-", 1.0),
+        ("friction_utilisation_max", "largest friction utilisation", "%", 100.0),
         ("yaw_rate_after_1000ms_share", "yaw rate remaining after 1.00 s", "%", 100.0),
         ("lane_overstep_m", "lane overstep", "m", 1.0),
         ("steering_wheel_rate_rms_radps", "steering wheel rate, RMS", "deg/s", 180.0 / math.pi),

@@ -39,7 +39,7 @@ Row = tuple[str, Callable[[Sweep], Array]]
 """Name and unit of the ordinate, and the function from a sweep to the values of each wheel, shape (n, 4)."""
 
 _TOE: Final[Row] = ("toe [deg]\n(+ toe-in)", lambda sweep: _DEG * sweep.toe_rad)
-_CAMBER: Final[Row] = ("camber [deg]\n(- top in)", lambda sweep: _DEG * sweep.camber_rad)
+_CAMBER: Final[Row] = ("camber [deg]\n(\N{MINUS SIGN} top in)", lambda sweep: _DEG * sweep.camber_rad)
 _LOAD: Final[Row] = ("vertical force\n[kN]", lambda sweep: 1e-3 * sweep.load_N)
 _WIND_UP: Final[Row] = (
     "wind-up of the\nknuckle [deg]",
@@ -212,7 +212,7 @@ def _rear_camber(result: KcResult) -> Picture:
     travel, force = result.curves["parallel_travel"], result.curves["lateral_in_phase"]
     panels = [
         Panel(
-            "wheel travel, both wheels [mm] (+ bump)", "camber [deg] (- top in)",
+            "wheel travel, both wheels [mm] (+ bump)", "camber [deg] (\N{MINUS SIGN} top in)",
             _wheels(1e3 * travel.x, _DEG * travel.camber_rad[:, 2:]), zero=True,
         ),
         Panel(
@@ -271,7 +271,7 @@ def _rear_steering(result: KcResult) -> Picture:
     middle_m = design.contact_m[design.zero, 2, 1]
     shown: dict[str, Callable[[Sweep], Array]] = {
         "steer angle [deg] (+ to the left)": lambda sweep: _DEG * sweep.steer_rad[:, 2],
-        "camber [deg] (- top in)": lambda sweep: _DEG * sweep.camber_rad[:, 2],
+        "camber [deg] (\N{MINUS SIGN} top in)": lambda sweep: _DEG * sweep.camber_rad[:, 2],
         "contact point outwards [mm]": lambda sweep: 1e3 * (sweep.contact_m[:, 2, 1] - middle_m),
     }
     looks = (("_bump", "bump 40 mm", _LEFT), ("", "standing", _GREY), ("_rebound", "rebound 40 mm", _RIGHT))

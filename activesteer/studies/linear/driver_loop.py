@@ -331,8 +331,8 @@ def conclusion(rows: Sequence[Mapping[str, Any]]) -> list[Text]:
         row = min(judged, key=lambda row: row[key])
         value = (passed if row[key] >= asked else failed)(f"{row[key]:.{digits}f}{unit}")
         where = f" with {row['controller']} at {row['speed_kmh']:g} km/h; "
-        where += f"the typical driver must reach {asked:g}{unit}{speeds}."
-        found.append(Markup("The smallest {} is ").format(words) + value + where)
+        where += f"the typical driver must reach {asked:g}{unit}."
+        found.append(Markup("The smallest {}{} is ").format(words, speeds) + value + where)
     return found
 
 

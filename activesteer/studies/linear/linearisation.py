@@ -434,8 +434,8 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
     panels = []
     for output in _GAIN_UNITS:
         values = found[system.output_labels.index(output), system.input_labels.index("steering_wheel_rad")]
-        gain = Curve(frequency_Hz, np.abs(values), "", RUN_COLOURS[1], "-", 1.5)
-        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), "", RUN_COLOURS[1], "-", 1.5)
+        gain = Curve(frequency_Hz, np.abs(values), "", RUN_COLOURS[0], "-", 1.5)
+        phase = Curve(frequency_Hz, np.degrees(np.unwrap(np.angle(values))), "", RUN_COLOURS[0], "-", 1.5)
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
         short = quantity_of(output).short
         panels.append(Panel(below, f"{short} gain\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))

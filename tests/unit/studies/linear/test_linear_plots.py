@@ -112,6 +112,7 @@ def test_the_loop_of_the_driver_is_judged_by_what_is_asked():
     assert "\N{BALLOT X} 0.24 with afs" in in_run
     # A damping is asked from 80 to 100 km/h only.
     _, linear, _ = conclusion([*rows, rows[0] | {"speed_kmh": 140.0, "damping": 0.1}])
+    assert "The smallest damping ratio of the linear loop from 80 to 100 km/h is " in linear
     assert "\N{CHECK MARK} 0.40" in linear
 
 
