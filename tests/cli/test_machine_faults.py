@@ -118,15 +118,19 @@ def test_a_full_disk_leaves_no_half_report(tmp_path: Path, recording: Path, limi
 @pytest.mark.parametrize(
     "command", ["run", *(pytest.param(name, marks=pytest.mark.slow) for name in ("study", "report"))]
 )
-def test_a_folder_that_may_not_be_written_is_one_error(tmp_path: Path, recording: Path, command: str) -> None:
+def test_a_folder_that_may_not_be_written_is_one_error(
+    tmp_path: Path, request: pytest.FixtureRequest, command: str
+) -> None:
     (tmp_path / "grip.toml").write_text(STUDY)
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)
     words = {
         "run": ("run", "straight_line", *SHORT, "-o", "closed/run.mcap"),
         "study": ("study", "grip.toml", "-o", "closed/s", "--jobs", "1"),
-        "report": ("report", str(recording), "-o", "closed/report.html"),
+        "report": ("report", "-o", "closed/report.html"),
     }[command]
+    if command == "report":
+        words += (str(request.getfixturevalue("recording")),)
     done = program(tmp_path, *words, before=unprivileged())
     assert_refused(done)
     assert "closed" in done.stderr
@@ -248,7 +252,7 @@ def test_a_thousand_runs_in_one_process_lose_less_than_2_kB_each() -> None:
     assert after_1000_MB < after_200_MB + 800 * 0.002
 
 
-OVERRIDES = {"sensors.preset": "production"}
+OVERRIDES = {"sensors.preset": "production", "duration_s": 4.0}
 HASH = f"""
 import hashlib, activesteer
 run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides={OVERRIDES})
@@ -263,7 +267,7 @@ def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_
         run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides=OVERRIDES)
         found.append(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 
-    activesteer.simulate("straight_braking", "none", "sedan")
+    activesteer.simulate("straight_braking", "none", "sedan", overrides={"duration_s": 1.0})
     drive()
     threads = [threading.Thread(target=drive) for _ in range(2)]
     for thread in threads:

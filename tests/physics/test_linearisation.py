@@ -143,7 +143,7 @@ def test_state_space_has_names_and_no_heave():
 
 
 def test_yaw_gain_is_largest_at_the_characteristic_speed():
-    speeds = np.arange(60.0, 116.0, 5.0) / 3.6
+    speeds = np.arange(60.0, 116.0, 10.0) / 3.6
     gains = [np.asarray(linear_car("compact", speed).state_space().dcgain())[0, 0] for speed in speeds]
     a, b, _ = np.polyfit(speeds, gains, 2)
     stored = load_car().config.single_track.characteristic_speed_mps
