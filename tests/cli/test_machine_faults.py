@@ -252,10 +252,14 @@ def test_a_thousand_runs_in_one_process_lose_less_than_2_kB_each() -> None:
     assert after_1000_MB < after_200_MB + 800 * 0.002
 
 
-OVERRIDES = {"sensors.preset": "production", "duration_s": 4.0}
+LANE = {
+    "kind": "follow_path", "speed_kmh": 80, "duration_s": 3.0, "road": {"mu": 0.4},
+    "path": {"x_m": [0.0, 20.0, 30.0, 40.0, 60.0, 80.0], "y_m": [0.0, 0.0, 1.0, 2.0, 2.0, 2.0]},
+}  # fmt: skip
+OVERRIDES = {"sensors.preset": "production"}
 HASH = f"""
 import hashlib, activesteer
-run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides={OVERRIDES})
+run = activesteer.simulate({LANE}, "lqr", overrides={OVERRIDES})
 print(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 """
 
@@ -264,7 +268,7 @@ def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_
     found: list[str] = []
 
     def drive() -> None:
-        run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides=OVERRIDES)
+        run = activesteer.simulate(LANE, "lqr", overrides=OVERRIDES)
         found.append(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 
     activesteer.simulate("straight_braking", "none", "sedan", overrides={"duration_s": 1.0})

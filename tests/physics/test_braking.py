@@ -49,7 +49,7 @@ def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, c
     assert 0.9 <= found["braking_efficiency"] <= 1.0
 
 
-@pytest.mark.parametrize("friction", [1.0, 0.6, 0.3])
+@pytest.mark.parametrize("friction", [1.0, pytest.param(0.6, marks=pytest.mark.slow), 0.3])
 @pytest.mark.parametrize("vehicle", ["compact", "sedan", pytest.param("bmw_m8", marks=pytest.mark.slow)])
 def test_a_full_stop_keeps_its_deceleration_to_walking_pace(vehicle: str, friction: float) -> None:
     """Within a tenth of that around 10 m/s, down to 0.5 m/s, as production cars do."""

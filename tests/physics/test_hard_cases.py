@@ -72,7 +72,7 @@ def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_sn
         "factors.front_cornering_stiffness": 0.83, "factors.rear_cornering_stiffness": 1.06,
         "factors.rear_tyre_friction": 0.73, "rear_actuator.preset": "screw_10deg",
     }  # fmt: skip
-    turn = {"road.mu": 0.36, "turn.lateral_acceleration_mps2": 2.2, "brake.pedal": 0.57}
+    turn = {"road.mu": 0.36, "turn.lateral_acceleration_mps2": 2.2, "brake.pedal": 0.57, "duration_s": 7.3}
     none, controlled = (
         simulate("brake_in_turn", name, overrides=SENSORS | changes | turn, driver="expert")
         for name in ("none", "integrated")
@@ -93,7 +93,7 @@ def test_a_loaded_car_of_worn_rear_tyres_is_not_steered_over_its_limit_in_a_turn
         "factors.front_tyre_friction": 0.973, "factors.rear_tyre_friction": 0.789, "sensors.seed": 2,
         "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 13.49,
     }  # fmt: skip
-    turn = {"road.mu": 0.869, "turn.lateral_acceleration_mps2": 5.7, "brake.pedal": 0.673}
+    turn = {"road.mu": 0.869, "turn.lateral_acceleration_mps2": 5.7, "brake.pedal": 0.673, "duration_s": 7.3}
     none, controlled = (
         simulate("brake_in_turn", name, overrides=SENSORS | changes | turn) for name in ("none", controller)
     )
@@ -154,7 +154,7 @@ def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain
         "load.payload_kg": 62.7, "load.payload_forward_change_m": 0.361, "factors.front_cornering_stiffness": 0.90,
         "factors.rear_cornering_stiffness": 0.70, "factors.front_tyre_friction": 1.06,
         "factors.rear_tyre_friction": 0.86, "rear_actuator.preset": "screw_3deg", "road.mu": 0.602,
-        "road.patches.0.mu": 0.205, "speed_kmh": 62.5, "duration_s": 12.2,
+        "road.patches.0.mu": 0.205, "speed_kmh": 62.5, "duration_s": 9.0,
     }  # fmt: skip
     run = simulate("mu_jump", "integrated", "compact_electric", SENSORS | changes | {"sensors.seed": seed})
     # `esc` keeps 7 to 8 deg, and the car without control spins.
@@ -162,11 +162,13 @@ def test_brakes_hold_a_car_that_leaves_snow_while_the_estimator_does_not_explain
 
 
 @pytest.mark.parametrize("start_s", [2.2, pytest.param(2.8, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("maneuver", "kind"), [("slalom", "stuck"), ("double_lane_change", "reversed")])
-def test_brakes_do_not_follow_a_yaw_rate_sensor_that_fails(maneuver: str, kind: str, start_s: float):
+@pytest.mark.parametrize(
+    ("maneuver", "kind", "duration_s"), [("slalom", "stuck", 10.5), ("double_lane_change", "reversed", 8.0)]
+)
+def test_brakes_do_not_follow_a_yaw_rate_sensor_that_fails(maneuver: str, kind: str, duration_s: float, start_s: float):
     pytest.importorskip("daqp")
     fault = {"part": "yaw_rate_sensor", "kind": kind, "start_s": start_s}
-    run = simulate(maneuver, "integrated", overrides=SENSORS | {"fault": [fault]})
+    run = simulate(maneuver, "integrated", overrides=SENSORS | {"fault": [fault], "duration_s": duration_s})
     # With brakes that do not fade: 20 and 39 deg (frozen sensor), 84 and 49 deg (wrong sign).
     assert run.metrics["sideslip_peak_abs_rad"] < math.radians(15.0)
 
@@ -180,7 +182,7 @@ def test_slow_sound_actuators_are_not_taken_for_failed_in_a_lane_change(seed: in
         "factors.front_cornering_stiffness": 1.05, "factors.rear_cornering_stiffness": 0.714,
         "factors.front_tyre_friction": 0.863, "factors.rear_tyre_friction": 0.732,
         "rear_actuator.preset": "screw_3deg", "rear_actuator.supply_voltage_V": 11.55, "road.mu": 0.515,
-        "speed_kmh": 70.44, "duration_s": 18.2,
+        "speed_kmh": 70.44, "duration_s": 12.0,
     }  # fmt: skip
     overrides = SENSORS | changes | {"sensors.seed": seed}
     run = simulate("double_lane_change", "integrated", "sedan", overrides, driver="expert")

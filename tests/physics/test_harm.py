@@ -11,6 +11,7 @@ from activesteer import simulate
 SOFT_AND_HEAVY = {
     "speed_kmh": 86.0, "road.mu": 0.71, "factors.mass": 1.13, "factors.tyre_cornering_stiffness": 0.72,
     "sensors.preset": "production", "sensors.seed": 7,
+    "duration_s": 8.0,
 }  # fmt: skip
 """Car with which `lqr` once left the lane by 2.5 m; without control it leaves it by 0.17 m."""
 
@@ -58,7 +59,9 @@ def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(contro
 def test_a_superelevated_curve_is_no_ice(vehicle: str):
     """Its tyres carry two thirds of the turn. Taken for ice, `integrated` left the path by 0.77 and 0.85 m."""
     pytest.importorskip("daqp")
-    overrides = {"sensors.preset": "production", "road.banking.bank_deg": [0.0, 0.0, -6.0, -6.0, 0.0, 0.0]}
+    overrides = {
+        "sensors.preset": "production", "road.banking.bank_deg": [0.0, 0.0, -6.0, -6.0, 0.0, 0.0], "duration_s": 10.0,
+    }  # fmt: skip
     none, controlled = (
         simulate("banked_curve", name, vehicle, overrides=overrides).metrics["track_deviation_max_m"]
         for name in ("none", "integrated")

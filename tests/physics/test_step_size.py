@@ -11,7 +11,7 @@ from tests.physics.runs import STEP_DEG, run
 PEAKS = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
 
 
-@pytest.mark.parametrize("controller", ["none", "ars", "afs"])
+@pytest.mark.parametrize("controller", ["none", "ars", pytest.param("afs", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("channel", PEAKS)
 def test_peaks_agree_between_steps(channel: str, controller: str) -> None:
     coarse, fine = (
