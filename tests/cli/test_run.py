@@ -166,7 +166,7 @@ def test_program_starts_from_a_shell_whose_terminal_lacks_letters(tmp_path):
 def test_plot_is_drawn_beside_the_files(call, tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr("activesteer.plotting.drawing.DOTS_PER_INCH", 100)
-    told = call("run", "step_steer", "-c", "none", "-c", "ars", "-c", "afs", *EVALUATED, "--plot", "-o", "out")
+    told = call("run", "step_steer", "-c", "none", "-c", "ars", *EVALUATED, "--plot", "-o", "out")
     assert told.status == 0
     assert (tmp_path / "out" / "step_steer.png").stat().st_size > 10_000
     assert "figure: out/step_steer.png" in told.out

@@ -17,7 +17,7 @@ AT_THE_LIMIT = ("double_lane_change", "drive_off_and_stop", "slalom")
 FULL_THROTTLE = {
     "kind": "open_loop",
     "speed_kmh": 0,
-    "duration_s": 12,
+    "duration_s": 10,
     "speed": {"time_s": [0.5, 0.6], "speed_kmh": [0, 300]},
 }
 

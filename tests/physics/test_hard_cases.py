@@ -26,7 +26,7 @@ def sine(controller: str, car: str, amplitude_deg: float):
     return simulate("sine_with_dwell", controller, overrides=SENSORS | CARS[car] | changes)
 
 
-@pytest.mark.parametrize("car", CARS)
+@pytest.mark.parametrize("car", ["payload", pytest.param("screw", marks=pytest.mark.slow), "rear tyres"])
 def test_brakes_help_where_the_steering_does_not_suffice(car: str):
     pytest.importorskip("daqp")
     run = sine("integrated", car, 220.0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 
 import pytest
 
@@ -43,12 +45,15 @@ def test_stability_control_keeps_the_car_in_the_largest_sine_of_the_law(directio
         assert (pressure[1:] - pressure[:-1]).max() <= 3.0e4 * 1.001
 
 
+@functools.cache
+def onto_snow(controller: str) -> Mapping[str, float]:
+    changes = {"sensors.preset": "production"}
+    return simulate("mu_jump", controller, vehicle="compact_electric", overrides=changes).metrics
+
+
 @pytest.mark.parametrize("controller", ["esc", "tv"])
 def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(controller: str):
-    none, controlled = (
-        simulate("mu_jump", name, vehicle="compact_electric", overrides={"sensors.preset": "production"}).metrics
-        for name in ("none", controller)
-    )
+    none, controlled = (onto_snow(name) for name in ("none", controller))
     # A brake that acts for 40 ms where the wheels leave the snow moves the car by 1 mm.
     assert controlled["track_deviation_max_m"] < none["track_deviation_max_m"] + 0.01
     # With a desired yaw rate that only the estimated friction limits, esc had 7 deg and tv 11.5; none has 2.5.

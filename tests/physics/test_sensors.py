@@ -44,7 +44,7 @@ def test_ideal_sensors_are_no_sensors_at_all() -> None:
     np.testing.assert_array_equal(explicit.values, step_steer("ars").values)
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 def test_recorded_noise_is_that_of_the_settings(vehicle: str) -> None:
     recording = activesteer.simulate("straight_line", "none", vehicle, overrides={"sensors.preset": "production"})
     sensors = recording.metadata["vehicle"]["sensors"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ def canvas() -> None:
 
 
 @pytest.fixture
-def picture(drives: dict[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
+def picture(drives: Mapping[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
     """Return the picture of an instant, and save it for inspection."""
 
     def shoot(time_s: float, *names: str, **settings) -> np.ndarray:
