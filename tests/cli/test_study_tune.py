@@ -103,11 +103,12 @@ def test_a_metric_pattern_that_matches_nothing_is_said(call, tmp_path):
     assert "yaw_rate_over*" not in told.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "made", "how"),
     [
         (("study",), "parts/[0-9]*", r"resume with `activesteer study \S+`"),
-        pytest.param(("tune", "--trials", "1000"), "*.journal", "the same command resumes it", marks=pytest.mark.slow),
+        (("tune", "--trials", "1000"), "*.journal", "the same command resumes it"),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):

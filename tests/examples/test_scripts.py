@@ -156,6 +156,7 @@ def test_own_manoeuvre_file_brakes_in_its_turn() -> None:
     assert run["fl_mu"].min() == pytest.approx(table["road"]["patches"][0]["mu"])
 
 
+@pytest.mark.slow
 def test_own_cars_roll_as_their_changes_say(tmp_path: Path, show: Callable[..., None]) -> None:
     runs = (scope := example("own_car"))["compare"](tmp_path)
     show("own_car", scope, compare=lambda _folder: runs)

@@ -27,7 +27,7 @@ COASTING = {
 
 
 def from_100(changes: dict[str, Any] | None = None) -> Recording:
-    return run("straight_braking", **(changes or {}))
+    return run("straight_braking", settle_s=0.5, **(changes or {}))
 
 
 def stop_from_100(vehicle: str, changes: dict[str, Any]) -> Recording:

@@ -22,7 +22,13 @@ from tests.physics.runs import car, corners, last, mass_kg
 
 def drive(road: dict[str, Any], speed_kmh: float = 60.0, duration_s: float = 3.0, **more: Any) -> Recording:
     """Drive straight ahead over a road."""
-    table = {"kind": "open_loop", "speed_kmh": speed_kmh, "duration_s": duration_s, "road": road} | more
+    table = {
+        "kind": "open_loop",
+        "speed_kmh": speed_kmh,
+        "duration_s": duration_s,
+        "settle_s": 0.5,
+        "road": road,
+    } | more
     return activesteer.simulate(table)
 
 
