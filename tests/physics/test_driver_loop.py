@@ -76,7 +76,7 @@ def test_who_drives_better_gets_through_the_lane_change_faster():
     assert expert >= typical >= novice >= 1.0
 
 
-@pytest.mark.parametrize("controller", ["none", "ars"])
+@pytest.mark.parametrize("controller", ["none", pytest.param("ars", marks=pytest.mark.slow)])
 def test_linear_loop_is_damped_as_the_car_is_in_a_run(controller):
     # Without the friction of the rack, which no linear car can have, and without a tolerance band. A driver whom
     # nothing troubles but the offset itself swings; the typical one comes to the path without crossing it.
