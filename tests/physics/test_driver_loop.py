@@ -57,7 +57,7 @@ def test_typical_driver_takes_the_lane_change_as_a_human_does():
 
 
 def test_typical_driver_follows_a_path_at_a_tenth_of_g():
-    run = simulate("double_lane_change", overrides={"speed_kmh": 40.0, "duration_s": 17.5})
+    run = simulate("double_lane_change", overrides={"speed_kmh": 40.0, "duration_s": 14.5})
     assert metrics(run)["track_deviation_max_m"] <= 0.15
 
 

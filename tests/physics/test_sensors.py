@@ -16,7 +16,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state, step_steer
 from tests.raising import raises
 
-PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production"}
+PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production", "duration_s": 2.5}
 NOT_RANDOM = {
     f"sensors.{sensor}.{word}_{unit}": 0.0
     for sensor, unit in (
