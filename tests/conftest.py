@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import shutil
@@ -152,6 +153,13 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """A browser without a window; skip the test if there is none."""
+    with started_browser() as started:
+        yield started
+
+
+@contextlib.contextmanager
+def started_browser() -> Iterator[Browser]:
+    """Start a browser without a window; skip the test if there is none."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright, of the extra `dev`")
     names = ("chromium", "chromium-browser", "google-chrome")
     found = next((path for name in names if (path := shutil.which(name))), None)

@@ -32,7 +32,7 @@ def ended(
     )  # fmt: skip
 
 
-def begun(folder: Path, *words: str, **more: Any) -> subprocess.Popen[str]:
-    """Start the program, with pipes unless told otherwise."""
+def begun(folder: Path, *words: str, code: str = MAIN, **more: Any) -> subprocess.Popen[str]:
+    """Start the program or other code, with pipes unless told otherwise."""
     options: dict[str, Any] = {"env": environment(), "stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more
-    return subprocess.Popen([sys.executable, "-c", MAIN, *words], cwd=folder, text=True, **options)
+    return subprocess.Popen([sys.executable, "-c", code, *words], cwd=folder, text=True, **options)

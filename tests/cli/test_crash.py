@@ -48,12 +48,12 @@ class Mine:
 
     def step(self, command, measurement):
         self.steps += 1
-        if self.steps > 3001:  # just after a block is written: it may still be on its way
+        if self.steps > 1201:  # just after a block is written: it may still be on its way
             import os
             os.kill(os.getpid(), 9)
         return ActuatorCommand()
 """
-KILLED_S = 3.001
+KILLED_S = 1.201
 
 
 @pytest.fixture(scope="module")

@@ -206,7 +206,7 @@ CHECKS = [check_texts, check_odd_runs, check_bytes]
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # overflow: what is shown of nonsense may be nonsense
 @pytest.mark.parametrize("check", CHECKS)
 def test_recording_is_refused_or_every_command_can_handle_it(check, driven, folder, capsys, rng):
-    check(driven, folder, 10, rng)
+    check(driven, folder, 4, rng)
 
 
 @pytest.mark.slow

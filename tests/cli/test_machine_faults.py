@@ -115,18 +115,21 @@ def test_a_full_disk_leaves_no_half_report(tmp_path: Path, recording: Path, limi
 # -- folders, homes and languages --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "command", ["run", *(pytest.param(name, marks=pytest.mark.slow) for name in ("study", "report"))]
-)
-def test_a_folder_that_may_not_be_written_is_one_error(tmp_path: Path, recording: Path, command: str) -> None:
+@pytest.mark.slow  # the quick tests of test_errors.py have other targets that cannot be written
+@pytest.mark.parametrize("command", ["run", "study", "report"])
+def test_a_folder_that_may_not_be_written_is_one_error(
+    tmp_path: Path, request: pytest.FixtureRequest, command: str
+) -> None:
     (tmp_path / "grip.toml").write_text(STUDY)
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)
     words = {
         "run": ("run", "straight_line", *SHORT, "-o", "closed/run.mcap"),
         "study": ("study", "grip.toml", "-o", "closed/s", "--jobs", "1"),
-        "report": ("report", str(recording), "-o", "closed/report.html"),
+        "report": ("report", "-o", "closed/report.html"),
     }[command]
+    if command == "report":
+        words += (str(request.getfixturevalue("recording")),)
     done = program(tmp_path, *words, before=unprivileged())
     assert_refused(done)
     assert "closed" in done.stderr
@@ -248,10 +251,14 @@ def test_a_thousand_runs_in_one_process_lose_less_than_2_kB_each() -> None:
     assert after_1000_MB < after_200_MB + 800 * 0.002
 
 
+LANE = {
+    "kind": "follow_path", "speed_kmh": 80, "duration_s": 3.0, "road": {"mu": 0.4},
+    "path": {"x_m": [0.0, 20.0, 30.0, 40.0, 60.0, 80.0], "y_m": [0.0, 0.0, 1.0, 2.0, 2.0, 2.0]},
+}  # fmt: skip
 OVERRIDES = {"sensors.preset": "production"}
 HASH = f"""
 import hashlib, activesteer
-run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides={OVERRIDES})
+run = activesteer.simulate({LANE}, "lqr", overrides={OVERRIDES})
 print(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 """
 
@@ -260,10 +267,10 @@ def test_a_run_is_the_same_to_the_last_bit_in_processes_threads_and_after_other_
     found: list[str] = []
 
     def drive() -> None:
-        run = activesteer.simulate("double_lane_change_low_mu", "lqr", overrides=OVERRIDES)
+        run = activesteer.simulate(LANE, "lqr", overrides=OVERRIDES)
         found.append(hashlib.sha256(run.values.tobytes() + run.poses.positions_m.tobytes()).hexdigest())
 
-    activesteer.simulate("straight_braking", "none", "sedan")
+    activesteer.simulate("straight_braking", "none", "sedan", overrides={"duration_s": 1.0})
     drive()
     threads = [threading.Thread(target=drive) for _ in range(2)]
     for thread in threads:

@@ -11,7 +11,7 @@ import pytest
 
 from activesteer.commands.terminal import Progress
 from activesteer.studies.engine.study import StudyProgress
-from tests.cli.process import begun
+from tests.cli.process import MAIN, begun
 
 STUDY = """
 controllers = ["none"]
@@ -103,15 +103,17 @@ def test_a_metric_pattern_that_matches_nothing_is_said(call, tmp_path):
     assert "yaw_rate_over*" not in told.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "made", "how"),
     [
         (("study",), "parts/[0-9]*", r"resume with `activesteer study \S+`"),
-        pytest.param(("tune", "--trials", "1000"), "*.journal", "the same command resumes it", marks=pytest.mark.slow),
+        (("tune", "--trials", "1000"), "*.journal", "the same command resumes it"),
     ],
 )
 def test_ctrl_c_says_how_to_go_on(file, tmp_path, words, made, how):
-    process = begun(tmp_path, words[0], str(file), *words[1:], "-o", str(tmp_path / "out"), "--jobs", "1")
+    often = "import activesteer.studies.engine.study as engine; engine._KEPT_EVERY_S = 0.5; " + MAIN
+    process = begun(tmp_path, words[0], str(file), *words[1:], "-o", str(tmp_path / "out"), "--jobs", "1", code=often)
     try:
         deadline = time.monotonic() + 120.0
         while not list((tmp_path / "out").glob(made)) and time.monotonic() < deadline:

@@ -29,8 +29,8 @@ PUBLIC = (
 )
 
 
-LONG = ("activesteer.studies.engine.study.", "activesteer.vehicle_builder.build.")
-"""Modules with examples that make a study or a car."""
+LONG = ("activesteer.studies.engine.study.", "activesteer.vehicle_builder.build.", "activesteer.rigs.kc.result.")
+"""Modules with examples that make a study or a car, or measure a car on the rig."""
 
 
 def examples() -> dict[str, doctest.DocTest]:

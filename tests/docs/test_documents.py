@@ -14,7 +14,7 @@ from tests.docs.blocks import Block, blocks
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-QUICK = {"README.md", "docs/index.md", "docs/stepping.md"}
+QUICK = {"README.md"}
 """Pages whose commands and code the quick tests run; the slow tests run all."""
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 

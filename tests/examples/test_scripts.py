@@ -24,8 +24,8 @@ EXAMPLES = ROOT / "examples"
 NEED_MORE = {"train_rear_steer.py", "udp_client.py"}
 """Scripts that need arguments, minutes of training or another process; tests of learning and of UDP use them."""
 SLOW = {"cosimulation.py"}
-DRIVEN = {"own_controller.py", "own_mpc.py", "own_manoeuvre.toml"}
-"""Files whose command drives what a test below drives; the slow tests run it."""
+DRIVEN = {"own_controller.py", "own_driver.py", "own_estimating_controller.py", "own_mpc.py", "own_manoeuvre.toml"}
+"""Files whose command drives what another test drives; the slow tests run it."""
 SHOWN = {f"own_{name}.py" for name in ("car", "controller", "driver", "loop", "manoeuvre", "mpc", "study")}
 """Scripts with a test of their own below, which drives once and gives the result to the part that prints."""
 SCRIPTS = [
@@ -156,6 +156,7 @@ def test_own_manoeuvre_file_brakes_in_its_turn() -> None:
     assert run["fl_mu"].min() == pytest.approx(table["road"]["patches"][0]["mu"])
 
 
+@pytest.mark.slow
 def test_own_cars_roll_as_their_changes_say(tmp_path: Path, show: Callable[..., None]) -> None:
     runs = (scope := example("own_car"))["compare"](tmp_path)
     show("own_car", scope, compare=lambda _folder: runs)

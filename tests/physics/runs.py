@@ -20,7 +20,7 @@ from activesteer.vehicle import Vehicle
 
 STEP_DEG = 36.5
 """Steering wheel angle of the step steers whose input must not depend on a search: about 0.4 g at 80 km/h."""
-COAST_OR_BRAKE = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 3.0, "drive": "coast"}
+COAST_OR_BRAKE = {"kind": "open_loop", "speed_kmh": 80, "duration_s": 3.0, "settle_s": 0.5, "drive": "coast"}
 """A car that rolls at 80 km/h with the clutch open, driven to that speed before."""
 
 

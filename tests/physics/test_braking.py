@@ -27,7 +27,7 @@ COASTING = {
 
 
 def from_100(changes: dict[str, Any] | None = None) -> Recording:
-    return run("straight_braking", **(changes or {}))
+    return run("straight_braking", settle_s=0.5, **(changes or {}))
 
 
 def stop_from_100(vehicle: str, changes: dict[str, Any]) -> Recording:
@@ -40,8 +40,14 @@ def _of_sedan(changes: tuple[tuple[str, Any], ...]) -> Recording:
     return simulate("straight_braking", vehicle="sedan", overrides=overrides)
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
-@pytest.mark.parametrize("changes", [{}, SLIPPERY, pytest.param(ICE, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("changes", "vehicle"),
+    [
+        ({}, "compact"), ({}, "sedan"), (SLIPPERY, "compact"),
+        *(pytest.param(changes, vehicle, marks=pytest.mark.slow)
+          for changes, vehicle in ((SLIPPERY, "sedan"), (ICE, "compact"), (ICE, "sedan"))),
+    ],
+)  # fmt: skip
 def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, changes: dict[str, Any]) -> None:
     """Half of the sedan's brake torque acts at the rear wheels, so these reach their limit first."""
     found = stop_from_100(vehicle, changes).metrics
@@ -49,8 +55,15 @@ def test_no_wheel_locks_and_nine_tenths_of_the_friction_are_used(vehicle: str, c
     assert 0.9 <= found["braking_efficiency"] <= 1.0
 
 
-@pytest.mark.parametrize("friction", [1.0, 0.6, 0.3])
-@pytest.mark.parametrize("vehicle", ["compact", "sedan", pytest.param("bmw_m8", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("vehicle", "friction"),
+    [
+        ("compact", 1.0), ("sedan", 1.0), ("sedan", 0.3),
+        *(pytest.param(vehicle, friction, marks=pytest.mark.slow) for vehicle, friction in (
+            ("compact", 0.6), ("compact", 0.3), ("sedan", 0.6), ("bmw_m8", 1.0), ("bmw_m8", 0.6), ("bmw_m8", 0.3)
+        )),
+    ],
+)  # fmt: skip
 def test_a_full_stop_keeps_its_deceleration_to_walking_pace(vehicle: str, friction: float) -> None:
     """Within a tenth of that around 10 m/s, down to 0.5 m/s, as production cars do."""
     changes = {"speed_kmh": 60, "road.mu": friction, "maneuver.duration_s": 2.0 + 3.0 / friction}
@@ -71,7 +84,9 @@ def test_dead_travel_and_build_up_of_pressure_delay_a_hard_stop_by_half_a_second
 
     def delay_s(**hydraulics: float) -> float:
         changes = {f"vehicle.brakes.hydraulics.{key}": value for key, value in hydraulics.items()}
-        recording = simulate("straight_braking", overrides={"brake.rise_s": 0.7, "brake.pedal": 0.6} | changes)
+        recording = simulate(
+            "straight_braking", overrides={"brake.rise_s": 0.7, "brake.pedal": 0.6, "duration_s": 2.0} | changes
+        )
         strong = recording["ax_mps2"] < -0.4 * GRAVITY_MPS2
         return float(recording.time_s[int(np.argmax(strong))]) - 0.5
 

@@ -17,7 +17,7 @@ from tests.physics.runs import (
     step_steer_scenario,
 )
 
-SYSTEMS = ("none", "ars", "afs")
+SYSTEMS = ("ars", *(pytest.param(name, marks=pytest.mark.slow) for name in ("none", "afs")))
 DERIVED = ("qacc", "sensordata", "qfrc_passive", "qfrc_actuator", "act_dot", "userdata", "actuator_force")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ class Reads:
         return ActuatorCommand(yaw_rate_desired_radps=measurement.yaw_rate_radps, prediction_rad=measurement.ay_mps2)
 
 
+@functools.cache
 def driven(*faults: str, controller: Any = Weaves, **overrides: Any) -> Recording:
     changes = {**STEP, **overrides}
     if faults:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Mapping
 
 import pytest
 
@@ -11,6 +13,7 @@ from activesteer import simulate
 SOFT_AND_HEAVY = {
     "speed_kmh": 86.0, "road.mu": 0.71, "factors.mass": 1.13, "factors.tyre_cornering_stiffness": 0.72,
     "sensors.preset": "production", "sensors.seed": 7,
+    "duration_s": 8.0,
 }  # fmt: skip
 """Car with which `lqr` once left the lane by 2.5 m; without control it leaves it by 0.17 m."""
 
@@ -42,12 +45,15 @@ def test_stability_control_keeps_the_car_in_the_largest_sine_of_the_law(directio
         assert (pressure[1:] - pressure[:-1]).max() <= 3.0e4 * 1.001
 
 
+@functools.cache
+def onto_snow(controller: str) -> Mapping[str, float]:
+    changes = {"sensors.preset": "production"}
+    return simulate("mu_jump", controller, vehicle="compact_electric", overrides=changes).metrics
+
+
 @pytest.mark.parametrize("controller", ["esc", "tv"])
 def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(controller: str):
-    none, controlled = (
-        simulate("mu_jump", name, vehicle="compact_electric", overrides={"sensors.preset": "production"}).metrics
-        for name in ("none", controller)
-    )
+    none, controlled = (onto_snow(name) for name in ("none", controller))
     # A brake that acts for 40 ms where the wheels leave the snow moves the car by 1 mm.
     assert controlled["track_deviation_max_m"] < none["track_deviation_max_m"] + 0.01
     # With a desired yaw rate that only the estimated friction limits, esc had 7 deg and tv 11.5; none has 2.5.
@@ -58,7 +64,9 @@ def test_no_controller_turns_the_car_in_where_its_front_wheels_reach_snow(contro
 def test_a_superelevated_curve_is_no_ice(vehicle: str):
     """Its tyres carry two thirds of the turn. Taken for ice, `integrated` left the path by 0.77 and 0.85 m."""
     pytest.importorskip("daqp")
-    overrides = {"sensors.preset": "production", "road.banking.bank_deg": [0.0, 0.0, -6.0, -6.0, 0.0, 0.0]}
+    overrides = {
+        "sensors.preset": "production", "road.banking.bank_deg": [0.0, 0.0, -6.0, -6.0, 0.0, 0.0], "duration_s": 10.0,
+    }  # fmt: skip
     none, controlled = (
         simulate("banked_curve", name, vehicle, overrides=overrides).metrics["track_deviation_max_m"]
         for name in ("none", "integrated")

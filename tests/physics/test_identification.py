@@ -47,11 +47,6 @@ def test_characteristic_speed_is_that_of_the_class():
     assert 77.0 < 3.6 * speed_mps < 93.0
 
 
-def test_heavier_car_is_seen_by_the_identification():
-    heavier = identified(load_car("compact", {"factors.mass": 1.1}))
-    assert heavier.mass_kg > single_track().mass_kg + 100.0
-
-
 def test_circle_is_held_while_the_car_is_far_from_its_limit():
     recording = run("constant_radius", duration_s=40.0)
     assert_has_key_metrics(recording)

@@ -12,12 +12,12 @@ from tests.physics.runs import assert_has_key_metrics, run
 @pytest.mark.parametrize(
     ("maneuver", "overrides"),
     [
-        ("brake_in_turn", {}),
+        ("brake_in_turn", {"duration_s": 7.5}),
         ("mu_jump", {}),
         ("random_steer", {"duration_s": 14.0}),
         ("straight_braking", {}),
         ("straight_line", {"duration_s": 2.0}),
-        ("hill_hold", {}),
+        ("hill_hold", {"duration_s": 3.0}),
     ],
 )
 def test_key_metrics_are_metrics_of_a_run(maneuver: str, overrides: dict[str, Any]) -> None:

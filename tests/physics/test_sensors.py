@@ -16,7 +16,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state, step_steer
 from tests.raising import raises
 
-PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production"}
+PRODUCTION = {"steer.steering_wheel_deg": STEP_DEG, "sensors.preset": "production", "duration_s": 2.5}
 NOT_RANDOM = {
     f"sensors.{sensor}.{word}_{unit}": 0.0
     for sensor, unit in (
@@ -44,7 +44,7 @@ def test_ideal_sensors_are_no_sensors_at_all() -> None:
     np.testing.assert_array_equal(explicit.values, step_steer("ars").values)
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 def test_recorded_noise_is_that_of_the_settings(vehicle: str) -> None:
     recording = activesteer.simulate("straight_line", "none", vehicle, overrides={"sensors.preset": "production"})
     sensors = recording.metadata["vehicle"]["sensors"]

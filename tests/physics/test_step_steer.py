@@ -1,4 +1,4 @@
-"""The step steer agrees with the paper and is the same for all systems."""
+"""The step steer agrees with the paper."""
 
 from __future__ import annotations
 
@@ -15,9 +15,3 @@ def test_the_manoeuvre_is_the_paper_s() -> None:
     assert recording["ay_mps2"][end].mean() == pytest.approx(0.4 * GRAVITY_MPS2, rel=1e-3)
     assert recording["speed_mps"][end].mean() * 3.6 == pytest.approx(80.0, rel=0.01)
     assert recording.metrics["steering_wheel_max_rate_radps"] > 3.49
-
-
-def test_all_systems_get_the_same_steering_input() -> None:
-    inputs = [run("step_steer", system)["steering_wheel_demand_rad"] for system in ("none", "ars", "afs")]
-    assert (inputs[0] == inputs[1]).all()
-    assert (inputs[0] == inputs[2]).all()

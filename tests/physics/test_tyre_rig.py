@@ -14,7 +14,7 @@ from tests.tyre_rig import RigForces, TyreRig
 from tests.tyre_rig import turned as to_heading
 
 TYRES = Path(__file__).parents[2] / "models" / "tyres"
-POINTS = 120
+POINTS = 48
 TOLERANCE = 1e-6
 """Of each column's peak. The rig itself leaves some 1e-9, from how steady the relaxation states are."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -21,25 +22,30 @@ from tests.physics.runs import car, corners, last, mass_kg
 
 def drive(road: dict[str, Any], speed_kmh: float = 60.0, duration_s: float = 3.0, **more: Any) -> Recording:
     """Drive straight ahead over a road."""
-    table = {"kind": "open_loop", "speed_kmh": speed_kmh, "duration_s": duration_s, "road": road} | more
+    table = {
+        "kind": "open_loop",
+        "speed_kmh": speed_kmh,
+        "duration_s": duration_s,
+        "settle_s": 0.5,
+        "road": road,
+    } | more
     return activesteer.simulate(table)
 
 
-@pytest.mark.parametrize(
-    "road",
-    [
-        {"bank_deg": 3.0},
-        {
-            "obstacle": [
-                {"kind": "cross_slope_ramp", "start_m": 5.0, "length_m": 20.0, "slope": math.tan(math.radians(3.0))}
-            ]
-        },
-    ],
-)
-def test_on_a_bank_the_tyres_carry_the_weight_and_its_part_down_the_slope(road: dict[str, Any]) -> None:
-    # A driver holds the straight line: a path along x, so that there is no lateral acceleration at the end.
+RAMP = {"kind": "cross_slope_ramp", "start_m": 5.0, "length_m": 20.0, "slope": math.tan(math.radians(3.0))}
+BANKS: dict[str, dict[str, Any]] = {"bank": {"bank_deg": 3.0}, "cross slope": {"obstacle": [RAMP]}}
+
+
+@functools.cache
+def on_bank(road: str) -> Recording:
+    """Return a run on a bank, whose driver holds a straight line: at the end there is no lateral acceleration."""
     path = {"kind": "follow_path", "path": {"x_m": [20.0 * i for i in range(10)], "y_m": [0.0] * 10}}
-    recording = drive(road, duration_s=9.0, **path)
+    return drive(BANKS[road], duration_s=9.0, **path)
+
+
+@pytest.mark.parametrize("road", BANKS)
+def test_on_a_bank_the_tyres_carry_the_weight_and_its_part_down_the_slope(road: str) -> None:
+    recording = on_bank(road)
     end, bank, weight_N = last(recording, 1.0), math.radians(3.0), mass_kg(car()) * GRAVITY_MPS2
     loads, across = corners(recording, "tyre_fz_N")[end].mean(axis=0), corners(recording, "tyre_fy_N")[end].mean(axis=0)
     steer = corners(recording, "steer_rad")[end].mean(axis=0)
@@ -56,10 +62,7 @@ def test_on_a_bank_the_tyres_carry_the_weight_and_its_part_down_the_slope(road: 
 
 
 def test_a_bank_of_the_whole_road_and_a_cross_slope_give_the_same_loads() -> None:
-    path = {"kind": "follow_path", "path": {"x_m": [20.0 * i for i in range(10)], "y_m": [0.0] * 10}}
-    slope = math.tan(math.radians(4.0))
-    ramp = {"obstacle": [{"kind": "cross_slope_ramp", "start_m": 5.0, "length_m": 10.0, "slope": slope}]}
-    one, other = drive({"bank_deg": 4.0}, duration_s=9.0, **path), drive(ramp, duration_s=9.0, **path)
+    one, other = (on_bank(road) for road in BANKS)
     end = last(one, 0.5)
     for name in ("tyre_fz_N", "tyre_fy_N"):
         expected = corners(one, name)[end].mean(axis=0)

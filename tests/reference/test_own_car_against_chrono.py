@@ -18,7 +18,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from activesteer.resources import models_dir
-from activesteer.rigs.kc import KcResult, kinematics_compliance
+from activesteer.rigs.kc.held_car import Case, HeldCar
+from activesteer.rigs.kc.programme import Sweep, run
+from activesteer.scenario import load_car
 from activesteer.vehicle_builder import new_vehicle
 
 FRONT = """
@@ -72,7 +74,8 @@ RIGID_NPM = "1e9"
 
 
 @functools.cache
-def measured() -> KcResult:
+def travel() -> Sweep:
+    """Return the parallel travel of the wheels without springs."""
     lines = REST.split("\n")
     for axle, points in (("front", FRONT), ("rear", REAR)):
         lines += [f"{axle}.{line}" for line in points.strip().split("\n")]
@@ -81,7 +84,9 @@ def measured() -> KcResult:
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "sedan.csv"
         table.write_text("\n".join(lines))
-        return kinematics_compliance(new_vehicle("twin", table, Path(folder) / "twin").vehicle_file)
+        car = HeldCar(load_car(new_vehicle("twin", table, Path(folder) / "twin").vehicle_file).on(), springs="out")
+    cases = {x: Case(height_m=np.full(4, x)) for x in np.linspace(-0.08, 0.08, 33).tolist()}
+    return run(car, "parallel wheel travel", "wheel travel", "m", cases)
 
 
 @functools.cache
@@ -94,7 +99,7 @@ def reference() -> dict[str, np.ndarray]:
 @pytest.mark.parametrize(("axle", "corner"), [("front", 0), ("rear", 2)])
 @pytest.mark.parametrize(("name", "share"), [("toe_in_deg", None), ("camber_deg", None), ("shock_len_mm", 0.01)])
 def test_wheel_travel(axle: str, corner: int, name: str, share: float | None) -> None:
-    sweep = measured().curves["parallel_kinematic"]
+    sweep = travel()
     ours = {
         "toe_in_deg": np.degrees(sweep.toe_rad[:, corner]),
         "camber_deg": np.degrees(sweep.camber_rad[:, corner]),
@@ -102,8 +107,8 @@ def test_wheel_travel(axle: str, corner: int, name: str, share: float | None) ->
     }[name]
     # Both begin in the design position: there Chrono's travel is 0, and there the made car stands.
     height = 1e3 * (sweep.centre_m[:, corner, 2] - sweep.centre_m[sweep.zero, corner, 2])
-    travel, theirs = reference()["travel_mm"], reference()[f"{name}_{axle}"]
-    difference = CubicSpline(height, ours - ours[sweep.zero])(travel) - (theirs - np.interp(0.0, travel, theirs))
+    travel_mm, theirs = reference()["travel_mm"], reference()[f"{name}_{axle}"]
+    difference = CubicSpline(height, ours - ours[sweep.zero])(travel_mm) - (theirs - np.interp(0.0, travel_mm, theirs))
     allowed = 0.01 if share is None else share * np.ptp(theirs)
     assert np.ptp(theirs) > 20.0 * allowed
     assert np.abs(difference).max() < allowed

@@ -121,6 +121,7 @@ def test_brakes_of_540_Nm_a_wheel_stop_the_car_as_a_hand_calculation_says() -> N
     assert -run["ax"][late].mean() == pytest.approx(by_hand, rel=0.005)
 
 
+@pytest.mark.slow
 def test_the_response_does_not_depend_on_the_step() -> None:
     """-2.8 % of steady yaw rate is the error of the other code at 1 ms."""
     coarse, fine = ours("step_0p4g_L"), ours("step_0p4g_L", 0.00025)

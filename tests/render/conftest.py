@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+import functools
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 from activesteer.recording import Recording
 from activesteer.scenario import resolve
 from activesteer.simulation.runner import run_scenario
+from tests.conftest import started_browser
 from tests.render.headless import Headless, ViewerDied
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 _NOTHING_DRAWS: Final = ("No graphics adapter was found", "Failed to get render context")
 """What the viewer ends with where there is no Vulkan driver: without OpenGL, and with one that does not suffice."""
@@ -31,10 +37,52 @@ def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Headless]:
 
 
 @pytest.fixture(scope="session")
-def drives() -> dict[str, Recording]:
+def drives() -> Mapping[str, Recording]:
     """A double lane change on a slippery road, at a speed at which the cars differ."""
-    scenario = resolve("double_lane_change_low_mu", overrides={"maneuver.speed_kmh": 95.0, "duration_s": 10.0})
-    return {controller: run_scenario(scenario, controller) for controller in ("none", "ars", "afs")}
+    return _Drives()
+
+
+class _Drives(Mapping[str, Recording]):
+    """Runs of the three systems, each driven when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._scenario = resolve(
+            "double_lane_change_low_mu", overrides={"maneuver.speed_kmh": 95.0, "duration_s": 10.0}
+        )
+        self._driven: dict[str, Recording] = {}
+
+    def __getitem__(self, controller: str) -> Recording:
+        if controller not in self._driven:
+            self._driven[controller] = run_scenario(self._scenario, controller)
+        return self._driven[controller]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(("none", "ars", "afs"))
+
+    def __len__(self) -> int:
+        return 3
+
+
+_browser = contextlib.ExitStack()
+
+
+@functools.cache
+def _started() -> Browser:
+    return _browser.enter_context(started_browser())
+
+
+@pytest.fixture
+def browser() -> Browser:
+    """One browser for all tests of this folder."""
+    return _started()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(nextitem: pytest.Item | None) -> None:
+    """Close the browser after the last test of the folder: elsewhere, its event loop would be in the way."""
+    if nextitem is None or not nextitem.location[0].startswith("tests/render/"):
+        _started.cache_clear()
+        _browser.close()
 
 
 @pytest.fixture(scope="session")

@@ -89,7 +89,7 @@ def test_keys_drive_the_car_and_leave_a_recording(browser: Browser, served: tupl
     page.click("#start", timeout=LIMIT_MS)  # once the car is ready
     page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
     page.keyboard.down("ArrowLeft")
-    page.wait_for_timeout(2000)
+    page.wait_for_timeout(1500)
     page.keyboard.up("ArrowLeft")
     page.keyboard.press("r")  # restart: the drive is saved, and the car drives off at the start again
     restarted(page, asked=3)

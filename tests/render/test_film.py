@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,7 @@ def canvas() -> None:
 
 
 @pytest.fixture
-def picture(drives: dict[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
+def picture(drives: Mapping[str, Recording], folder: Path) -> Callable[..., np.ndarray]:
     """Return the picture of an instant, and save it for inspection."""
 
     def shoot(time_s: float, *names: str, **settings) -> np.ndarray:
@@ -69,6 +69,8 @@ def test_chase_camera_shows_car_road_cones_and_sky(picture):
     assert share(pixels, white) > 0.005
     assert pixels[0, 5, 2] > pixels[120, 5, 2]  # sky is brighter and bluer than the road
     assert pixels[-1].std() > 1.0  # the surface has a pattern
+    road = np.s_[100:160, :80]
+    assert np.abs(pixels[road] - picture(1.74)[road]).mean() > 0.5  # and it moves
 
 
 @pytest.mark.slow
@@ -110,12 +112,6 @@ def test_wheel_camera_shows_tyre_and_spring(picture):
         # Black of the tyre, and the yellow of springs.
         assert share(pixels, lambda r, g, b: (r < 60) & (g < 60) & (b < 75)) > 0.05
         assert share(pixels, lambda r, g, b: (r > b + 50) & (g > b + 20) & (g < r)) > 0.002
-
-
-def test_motion_is_seen(picture):
-    before, after = picture(2.0), picture(2.04)
-    road = np.s_[100:160, :80]
-    assert np.abs(before[road] - after[road]).mean() > 0.5
 
 
 @pytest.mark.slow

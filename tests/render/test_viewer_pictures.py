@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from tests.render.headless import Headless, Picture, save_pictures
 pytestmark = pytest.mark.render
 
 Pictures = dict[str, Picture]
-Drives = dict[str, Recording]
+Drives = Mapping[str, Recording]
 
 SKY, ASPHALT, CONE, LANE = (176, 196, 214), (58, 60, 64), (255, 120, 20), (0, 158, 115)
 NONE, ARS, AFS = "#8d939c", *RUN_COLOURS_ON_DARK[1:3]

@@ -31,9 +31,8 @@ def test_the_step_steer_gives_the_listed_verdicts() -> None:
     check("step_steer")
 
 
-@pytest.mark.parametrize(
-    "name", ["around_paper_setting", pytest.param("around_paper_setting_wide", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", AROUND)
 def test_the_studies_around_the_setting_are_as_the_tool_writes_them(name: str) -> None:
     found = read_study(name)
     assert found.to_toml() == around(name).to_toml()

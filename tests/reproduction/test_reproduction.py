@@ -65,16 +65,24 @@ def test_the_steering_wheel_angle_is_not_wrapped(runs: Runs) -> None:
             assert np.abs(np.diff(recording["steering_wheel_rad"])).max() < np.radians(3.0)
 
 
-@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("scenarios", "numbers"),
+    [
+        (("step_steer",), (1, 2, 7, 9, 11)),
+        pytest.param(tuple(SCENARIOS), (1, 2, 7, 9, *range(11, 25)), marks=pytest.mark.slow),
+    ],
+)
 def test_the_figures_are_drawn_from_the_files(
-    runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: bool
+    runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scenarios: tuple[str, ...], numbers: tuple[int, ...]
 ) -> None:
     monkeypatch.setattr("activesteer.plotting.drawing.DOTS_PER_INCH", 100)
     figure = pytest.importorskip("matplotlib.figure").Figure
     savefig = figure.savefig
+    every = len(scenarios) > 1
 
-    def drawn(name: str) -> bool:  # one figure in all formats, and every figure once
-        return "figure_11" in name or (every and ".png" in name)
+    def drawn(name: str) -> bool:  # one figure once or in all formats, and every figure once
+        is_one = "figure_11" in name
+        return (is_one or ".png" in name) if every else (is_one and ".png" in name)
 
     def save(self: Any, path: Path, **how: Any) -> None:
         if drawn(path.name):
@@ -83,13 +91,14 @@ def test_the_figures_are_drawn_from_the_files(
             path.touch()
 
     monkeypatch.setattr(figure, "savefig", save)
-    names = {path.name for path in draw_figures(runs, tmp_path / "figures", "compact")}
-    for number in (1, 2, 7, 9, *range(11, 25)):
+    folder = tmp_path / "figures"
+    names = {path.name for path in draw_figures({name: runs[name] for name in scenarios}, folder, "compact")}
+    for number in numbers:
         assert {".png", ".svg", ".pdf"} == {
             Path(name).suffix for name in names if name.startswith(f"figure_{number:02}_")
         }
-    assert len(names) == 3 * (2 + len(OF_ANY_RUN) + sum(map(len, BY_SCENARIO.values())))
-    assert all((tmp_path / "figures" / name).stat().st_size > 5000 for name in names if drawn(name))
+    assert len(names) == 3 * (2 + len(OF_ANY_RUN) + sum(len(BY_SCENARIO[name]) for name in scenarios))
+    assert all((folder / name).stat().st_size > 5000 for name in names if drawn(name))
 
 
 def test_the_number_of_processes_is_checked(tmp_path: Path) -> None:
@@ -103,14 +112,14 @@ def test_a_run_that_fails_ends_no_other(tmp_path: Path, monkeypatch: pytest.Monk
         "class Mine:\n    def step(self, command, measurement):\n        raise RuntimeError('after all')\n"
     )
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("activesteer.studies.reproduction.SCENARIOS", {"slalom": SCENARIOS["slalom"]})
+    monkeypatch.setattr("activesteer.studies.reproduction.SCENARIOS", {"step_steer": SCENARIOS["step_steer"]})
     monkeypatch.setattr("activesteer.studies.reproduction.SYSTEMS", ("none", "mine.py:Mine"))
     result = reproduce(tmp_path)
-    assert list(result.failures) == [("slalom", "mine.py:Mine")]
-    assert "after all" in result.failures["slalom", "mine.py:Mine"]
+    assert list(result.failures) == [("step_steer", "mine.py:Mine")]
+    assert "after all" in result.failures["step_steer", "mine.py:Mine"]
     assert result.scorecard.judged == ()
     assert result.exit_status == 1
-    assert Recording.open(result.paths["slalom"]["none"]).metadata["complete"]
+    assert Recording.open(result.paths["step_steer"]["none"]).metadata["complete"]
 
 
 def test_what_cannot_be_written_is_told_before_anything_is_driven(

@@ -36,9 +36,10 @@ def nominal(**passed: bool) -> list[Claim]:
 
 
 def shortened(samples: int) -> StudyFile:
-    """Return the population with its fastest scenario and two factors, whose effects are soon found."""
+    """Return the population with its fastest scenario, a given angle, and two factors, whose effects are soon found."""
     table = population_study(samples).to_table()
     table["maneuvers"] = ["step_steer"]
+    table["overrides"] = {"steer.steering_wheel_deg": 36.5}
     table["factors"] = {key: table["factors"][key] for key in ("factors.mass", "sensors.preset")}
     return read_study(table)
 
