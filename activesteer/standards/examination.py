@@ -139,7 +139,15 @@ def examination_page(result: Examination) -> Page:
         first, *others = (found.error or typeset(found.summary)).split(". ")
         words = [Markup("{}{} {}.").format(_verdict(found), mark, first), *(f"{other}." for other in others)]
         own = [picture for picture in found.pictures if picture.title not in together]
-        sections.append(Section(name, words, found.tables, pictures=own))
+        # A table and the plots of the same runs stand together.
+        shared = {table.title for table in found.tables} & {picture.title for picture in own}
+        tables = [table for table in found.tables if table.title not in shared]
+        pictures = [picture for picture in own if picture.title not in shared]
+        sections.append(Section(name, words, tables, pictures=pictures))
+        for table in found.tables:
+            if table.title in shared:
+                drawn = [picture._replace(title="") for picture in own if picture.title == table.title]
+                sections.append(Section(table.title, tables=[table._replace(title="")], pictures=drawn, level=3))
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from activesteer.analysis.handling import CarGeometry, evaluate
+from activesteer.analysis.handling import FIT_MPS2, CarGeometry, evaluate
 from activesteer.core.conventions import Array
 from activesteer.core.metric_table import metric
 from activesteer.core.units import quantity_of
@@ -117,8 +117,9 @@ def _picture(method: str, runs: dict[str, StandardRun]) -> Picture:
             if run.error and not run.channels:
                 continue
             ay = _smooth(run["ay_mps2"])
-            top = int(np.argmax(np.abs(ay))) + 1
-            curves.append(Curve(np.abs(ay[:top]), SIDES[side] * factor * _smooth(run[channel])[:top], side))
+            # The car enters the circle below the range of the gradients.
+            shown = slice(int(np.argmax(np.abs(ay) >= FIT_MPS2[0])), int(np.argmax(np.abs(ay))) + 1)
+            curves.append(Curve(np.abs(ay[shown]), SIDES[side] * factor * _smooth(run[channel])[shown], side))
         return Panel("lateral acceleration [m/s²]", axis_label(channel), curves)
 
     channels = ("steering_wheel_rad", "sideslip_rad", "roll_rad")

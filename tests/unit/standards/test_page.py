@@ -46,6 +46,17 @@ def test_a_method_without_limits_never_says_pass():
     assert "No limits in the standard" in text
 
 
+def test_a_table_stands_above_the_plots_of_its_runs():
+    line = Panel("x", "y", [Curve([0.0, 1.0], [0.0, 1.0])])
+    tables = [Table(title, ["of"], [["1"]]) for title in ("Circle", "Limits")]
+    pictures = [Picture(title, [line]) for title in ("Track", "Circle")]
+    page = examination_page(replace(examination("word"), findings={"none": Findings({}, "", tables, pictures)}))
+    first, second, *_ = page.sections
+    assert [table.title for table in first.tables] == ["Limits"]
+    assert [picture.title for picture in first.pictures] == ["Track"]
+    assert (second.title, second.level, len(second.tables), len(second.pictures)) == ("Circle", 3, 1, 1)
+
+
 def test_overlaid_controllers_share_their_pictures_and_sides_differ_in_width():
     def findings(height: float) -> Findings:
         curves = [Curve([0.0, 1.0], [0.0, height + place], side) for place, side in enumerate(("left", "right"))]
