@@ -58,7 +58,7 @@ class LqrParameters:
     superposition_scale_rad: _Scale
     """Scale of the superposition angle [rad]."""
     reference_length_m: _Length
-    """Distance over which the desired yaw rate follows the driver [m]."""
+    """Distance over which the desired yaw rate follows the driver [m]. The car's own lag limits its time."""
     friction_fraction: Annotated[float, Range(0.1, 1.5)]
     """Fraction of the estimated friction that the desired yaw rate may use [-]."""
     friction_deviations: Annotated[float, Range(0.0, 10.0)]
@@ -98,7 +98,7 @@ class YawMomentParameters:
     """T_b: half the time in which the moment, without damping, turns the car back by the sideslip angle beyond its
     limit [s]."""
     reference_length_m: _Length
-    """Distance over which the desired yaw rate follows the driver [m]."""
+    """Distance over which the desired yaw rate follows the driver [m]. The car's own lag limits its time."""
     friction_fraction: _Fraction
     """Fraction of the estimated friction that the desired yaw rate and, with `tv`, a wheel may use [-]."""
     acceleration_time_s: _Lag

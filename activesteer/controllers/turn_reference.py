@@ -15,11 +15,14 @@ from activesteer.theory.single_track import SingleTrack, SingleTrackParameters, 
 class TurnReference(NativeBlock):
     """Desired yaw rate (eqs. 3 and 6) with the estimated friction, behind a first-order lag.
 
-    The lag is a distance, like the lag of the tyres: at twice the speed the car responds in half the time.
+    The lag is a distance, like the lag of the tyres: at twice the speed the car responds in half the time. At low speed
+    it is at most the longest lag of the single-track model, so that the car does not respond later than without
+    control.
     """
 
     _single_track: SingleTrack
     _length_m: float
+    _longest_s: float
     _interval_s: float
     _most_mps2: float
     _lagged_rad: float
@@ -32,7 +35,8 @@ class TurnReference(NativeBlock):
     ) -> None:
         """Compute the constants, with `length_m` as the distance over which the yaw rate follows the driver."""
         self._single_track = SingleTrack(single_track)
-        self._length_m, self._interval_s = length_m, interval_s
+        self._length_m, self._longest_s = length_m, self._single_track.longest_lag_s()
+        self._interval_s = interval_s
         self._most_mps2 = friction_fraction * GRAVITY_MPS2
         self._lagged_rad = self._driver_rad = self._speed_mps = self._limit_radps = 0.0
 
@@ -54,7 +58,8 @@ def desired_ahead(block: TurnReference, duration_s: float) -> float:
 
 @shared
 def _followed(block: TurnReference, duration_s: float) -> float:
-    fraction = -math.expm1(-duration_s * block._speed_mps / block._length_m)
+    lag_s = min(block._length_m / block._speed_mps, block._longest_s)
+    fraction = -math.expm1(-duration_s / lag_s)
     return block._lagged_rad + fraction * (block._driver_rad - block._lagged_rad)
 
 

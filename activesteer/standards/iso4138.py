@@ -29,6 +29,7 @@ _START_KMH: Final = 15.0
 _RISE_MPS2: Final = 0.4
 """Rise of the speed of the second method [m/s2]."""
 _DURATION_S: Final = 90.0
+_FIXED_ANGLE: Final = f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on"
 _RESULT: Final = "understeer_gradient_radpmps2"
 
 
@@ -44,7 +45,7 @@ def examine(runner: StandardRunner) -> Findings:
             [{"circle.radius_m": sign * RADIUS_M} for sign in SIDES.values()],
             curves=_CHANNELS,
         ),
-        f"constant steering wheel angle, from {FIXED_RADIUS_M:g} m on": _fixed_angle(runner, car),
+        _FIXED_ANGLE: _fixed_angle(runner, car),
         f"constant speed {SPEED_KMH:g} km/h": runner.drive(
             "constant_speed",
             "slowly_increasing_steer",
@@ -122,7 +123,9 @@ def _picture(method: str, runs: dict[str, StandardRun]) -> Picture:
             curves.append(Curve(np.abs(ay[shown]), SIDES[side] * factor * _smooth(run[channel])[shown], side))
         return Panel("lateral acceleration [m/s²]", axis_label(channel), curves)
 
-    channels = ("steering_wheel_rad", "sideslip_rad", "roll_rad")
+    # The yaw rate takes the place of a steering wheel that is held.
+    first = "yaw_rate_radps" if method == _FIXED_ANGLE else "steering_wheel_rad"
+    channels = (first, "sideslip_rad", "roll_rad")
     return Picture(method[0].upper() + method[1:], [panel(channel) for channel in channels])
 
 

@@ -143,6 +143,27 @@ class SingleTrack(NativeBlock):
         """
         return yaw_rate_gain(self, speed_mps)
 
+    def longest_lag_s(self) -> float:
+        """Return the longest lag of the yaw rate behind a slow movement of the front wheels, over all speeds [s].
+
+        To first order in s, the transfer function of eqs. 1 and 2 is that of a lag
+
+            T(v) = k v / (1 + (v / v_ch)^2) - k_z v,    k_z = m l_V / (C_H l),
+            k = (J_z (C_V + C_H) + m (C_V l_V^2 + C_H l_H^2)) / (C_V C_H l^2),
+
+        with its maximum at (v / v_ch)^2 = (sqrt(k^2 + 8 k k_z) - k) / (2 k_z) - 1. The lag of a neutral car grows with
+        its speed without limit, and the result is infinite.
+        """
+        p = self.parameters
+        cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m
+        zero = p.mass_kg * lv / (ch * self.wheelbase_m)
+        poles = p.yaw_inertia_kgm2 * (cv + ch) + p.mass_kg * (cv * lv**2 + ch * lh**2)
+        poles /= cv * ch * self.wheelbase_m**2
+        square = (math.sqrt(poles * (poles + 8.0 * zero)) - poles) / (2.0 * zero) - 1.0
+        if square <= 0.0 or math.isinf(self.characteristic_speed_mps):
+            return math.inf
+        return self.characteristic_speed_mps * math.sqrt(square) * (poles / (1.0 + square) - zero)
+
     def rear_prediction(self, speed_mps: _Speed) -> tuple[_Speed, _Speed, _Speed]:
         """Return the coefficients of the rear angle that keeps the sideslip angle at zero, eq. 5.
 

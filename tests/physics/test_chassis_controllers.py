@@ -40,6 +40,17 @@ def test_step_is_answered_no_later_than_without_control_and_without_overshoot(st
     assert abs(found["sideslip_peak_rad"]) < abs(free["sideslip_peak_rad"])
 
 
+@pytest.mark.parametrize("speed_kmh", [30, 40])
+def test_step_at_low_speed_is_answered_no_later_than_without_control(speed_kmh):
+    keys = {"speed_kmh": speed_kmh, "steer.lateral_acceleration_mps2": 1.5}
+    free_s, found_s = (
+        activesteer.simulate("step_steer", name, overrides=keys).metrics["yaw_rate_response_time_s"]
+        for name in ("none", "lqr")
+    )
+    # Without the limit of the lag, the answer is 11 to 40 ms later.
+    assert found_s <= free_s + 0.006
+
+
 def test_rear_wheels_that_stick_in_mid_manoeuvre_leave_no_yaw_rate():
     fault = {"fault": [{"part": "rear", "kind": "stuck", "start_s": 1.45}]}
     left = {

@@ -179,3 +179,22 @@ def test_every_parameter_counts(key):
     before, after = SingleTrack(CAR).matrices(20.0), changed.matrices(20.0)
     assert not np.allclose(np.hstack(before), np.hstack(after), rtol=1e-3)
     assert changed.rear_prediction(20.0) != SingleTrack(CAR).rear_prediction(20.0)
+
+
+def test_longest_lag_is_that_of_a_slowly_growing_front_angle(car):
+    """To first order in s, a transfer function is G(0) (1 - T s)."""
+
+    def lag_s(speed_mps: float) -> float:
+        a, b = car.matrices(speed_mps)
+        below, at, above = (np.linalg.solve(s * np.eye(2) - a, b[:, 0])[0] for s in (-1e-4, 0.0, 1e-4))
+        return (below - above) / (2e-4 * at)
+
+    lags_s = [lag_s(speed_mps) for speed_mps in np.linspace(1.0, 60.0, 600)]
+    assert car.longest_lag_s() == pytest.approx(max(lags_s), rel=1e-4)
+    assert 1 < lags_s.index(max(lags_s)) < 598
+
+
+def test_lag_of_a_neutral_car_has_no_limit():
+    stiffness = CAR.rear_stiffness_Nprad * CAR.cg_to_rear_m / CAR.cg_to_front_m
+    neutral = replace(CAR, front_stiffness_Nprad=stiffness, characteristic_speed_mps=None)
+    assert math.isinf(SingleTrack(neutral).longest_lag_s())
