@@ -328,7 +328,11 @@ class Simulation(Copyable):
             ManeuverError: the simulation is being driven.
         """
         if not 0 < len(what) <= MAX_EVENT_LETTERS:
-            raise ParameterError(f"has {len(what)} letters", key="what", allowed=Range(1, MAX_EVENT_LETTERS))
+            raise ParameterError(
+                f"has {len(what)} characters; 1 to {MAX_EVENT_LETTERS} are allowed",
+                key="what",
+                allowed=Range(1, MAX_EVENT_LETTERS),
+            )
         with self.loop.in_use:
             self._check_going_on()
             self._note("note", what)

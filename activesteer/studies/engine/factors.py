@@ -133,9 +133,9 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         if value in ([], {}, ""):
             raise source.fail((*where, name), "is empty", value)
     if given.of and given.nominal is None:
-        raise source.fail((*where, "of"), "names an earlier factor, and needs nominal", given.of)
+        raise source.fail((*where, "of"), "needs the key nominal of the same factor", given.of)
     if given.grows_with and given.nominal != "times":
-        raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', given.grows_with)
+        raise source.fail((*where, "grows_with"), 'has an effect only with nominal = "times"', given.grows_with)
     factor = Factor(**vars(given), key=key)
     if factor.values:
         _check_values(factor, source)
