@@ -467,7 +467,9 @@ class Simulation(Copyable):
             RecordingError: the file cannot be written.
         """
         if self.loop.step_count or self._writer is not None:
-            raise RecordingError("a run is recorded to one file, from its first step", key="path", value=path)
+            raise RecordingError(
+                "a run can be recorded to one file only, and only from its first step", key="path", value=path
+            )
         with self.context.writer(path) as self._writer:
             if self.events:
                 self._writer.write_events(self.events)

@@ -170,8 +170,8 @@ def _check_values(factor: Factor, source: Source) -> None:
     for value in given:
         if not is_plain(value):
             raise source.fail(where, f"{shown(value)} is not a number, string, true or false", value)
-    if any(given.count(value) > 1 for value in given):
-        raise source.fail(where, "a value is given twice")
+    if twice := [value for value in given if given.count(value) > 1]:
+        raise source.fail(where, f"{shown(twice[0])} is given twice; leave one out", twice[0])
     place = ("factors", factor.key, "weights")
     if weights and len(weights) != len(given):
         raise source.fail(place, f"as many weights as values are needed: {len(given)}")
