@@ -193,9 +193,14 @@ class Road:
             if others := [key for key in ("heights", "roughness", "banking") if getattr(self, key) is not None]:
                 raise ManeuverError(f"cannot be combined with {' and '.join(others)}", key="crg")
         elif self.crg is not None:
-            raise ManeuverError("is not read; build the road from a manoeuvre", key="crg")
+            raise ManeuverError(
+                "names a file, but only a manoeuvre reads the file; build the road from a manoeuvre", key="crg"
+            )
         if self.profile is not None and self.heights is None:
-            raise ManeuverError("is not read; build the road from a manoeuvre, or give heights", key="profile")
+            problem = (
+                "names a file, but only a manoeuvre reads the file; build the road from a manoeuvre, or give heights"
+            )
+            raise ManeuverError(problem, key="profile")
 
     @property
     def _is_gridded(self) -> bool:
