@@ -1,8 +1,9 @@
 """Harm that a controller does, and loss of control.
 
-A controller *harms* a run if one of `SIZES` grows by more than its size. The sizes were written down before the
-first run of a comparison. A measure without a size is reported and not counted. A measure of 0 is as good as can be:
-moving within the lane is no harm, and an error within `FREE_SIDE_M` of a path is none either.
+A controller *harms* a run if one of the measures in `SIZES` grows by more than its threshold. The thresholds were
+written down before the first run of a comparison. A measure without a threshold is reported and not counted. A measure
+of 0 is as good as can be: moving within the lane is no harm, and an error within `FREE_SIDE_M` of a path is none
+either.
 
 One rule was added after the first run: a stopping distance counts only if the car without control keeps the free side
 of its lane. On a split road a car that does not drifts with all wheels onto the better side and stops there; a
@@ -165,7 +166,7 @@ SIZES: Final[dict[str, float | None]] = {
 
 
 def measured(metrics: Metrics) -> dict[str, float]:
-    """Return the measures of harm that the manoeuvre of a run has [SI], infinite where the run defines none."""
+    """Return the measures of harm of a run [SI], infinite where the run does not define a measure of its manoeuvre."""
     known = {name: math.nan if value is None else value for name, value in metrics.items()}
     missed = known.get(CONES_MISSED, 0.0)
     found = {"lost": float(has_spun(metrics) or missed != 0.0)}
@@ -209,11 +210,11 @@ def changes(without: Metrics, controlled: Metrics) -> dict[str, float]:
 
 
 def harms(change: Mapping[str, float]) -> list[str]:
-    """Return the measures of harm that grew by more than their size."""
+    """Return the measures of harm that grew by more than their threshold."""
     return [name for name, growth in change.items() if (size := SIZES[name]) is not None and growth > size]
 
 
 def severity(change: Mapping[str, float]) -> float:
-    """Return the largest growth of a counted measure, in multiples of its size."""
+    """Return the largest growth of a counted measure, in multiples of its threshold."""
     sizes = ((growth, SIZES[name]) for name, growth in change.items())
     return max((growth / size for growth, size in sizes if size), default=0.0)

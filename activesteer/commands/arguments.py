@@ -57,7 +57,7 @@ class Group:
         return declare
 
     def with_actions(self, name: str, help: str) -> Group:
-        """Declare a command with several actions, to be declared with the returned group."""
+        """Declare a command with several actions, and return the group in which to declare the actions."""
         actions = Group(name)
         self.commands.append((name, help, f"{help[0].upper()}{help[1:]}.", (), actions))
         return actions

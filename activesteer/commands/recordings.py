@@ -144,7 +144,7 @@ def _compare(options: argparse.Namespace) -> bool:
         from activesteer.measured.folder_file import write_template
 
         if options.files:
-            raise ParameterError("makes a new folder and compares nothing", key="--new")
+            raise ParameterError("makes a new folder and compares nothing; leave the files out", key="--new")
         for file in write_template(options.new):
             print(file)
         print(f"next: activesteer fit {options.new} -o {options.new}/page; then replace the lines marked with <-")

@@ -260,7 +260,9 @@ def judge(name: str, options: argparse.Namespace, *, page: Path | None, fitted: 
         raise ParameterError(f"{name} has nothing to fit; activesteer compare {name} predicts it", value=name)
     samples = getattr(options, "samples", None)
     if samples is not None and not is_circle:
-        raise ParameterError(f"has an effect with a measured circle only, and {name} is none", key="--samples")
+        raise ParameterError(
+            f"has an effect only with a measured circle, and {name} has no table [circle]", key="--samples"
+        )
     with terminal.Progress("fit" if fitted else "compare", quiet=options.json) as bar:
         if is_circle:
             result = validate_circle(file, samples or SAMPLES, jobs, scheduler=scheduler, progress=bar)

@@ -68,7 +68,7 @@ def _reproduce(options: argparse.Namespace) -> int:
         lines.append(f"figures: {len(figures)} files in {options.output / 'figures'}")
     if "paper" in settings:
         lines.append(
-            "The paper's setting was selected by the verdicts. It shows that the claims can hold together, no more."
+            "The paper's setting was selected by the verdicts. It shows only that the claims can hold at the same time."
         )
     if not options.all:
         lines.append("--all prints every claim with its numbers")

@@ -189,6 +189,6 @@ def _borne_mps2(slips: Table, slip_angle_rad: float, friction: float) -> float:
 
 @shared
 def _between(values: Table, place: float) -> float:
-    """Interpolate in a row at a fractional index, constant beyond its end."""
+    """Interpolate in a row at a fractional index, with the last value held beyond the end of the row."""
     index = min(int(place), len(values) - 2)
     return values[index] + min(place - index, 1.0) * (values[index + 1] - values[index])

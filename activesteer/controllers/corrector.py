@@ -92,7 +92,7 @@ shared(tolerance)
 
 @shared
 def corrected(block: Corrector, error_radps: float, saturated: int) -> float:
-    """Law of `Corrector.step`."""
+    """Computation of `Corrector.step`."""
     activity = tolerance(error_radps, block._deadband_start_radps, block._deadband_end_radps)
     angle = block._proportional_gain_s * error_radps
     if block._integral_fraction:
@@ -108,7 +108,7 @@ def corrected(block: Corrector, error_radps: float, saturated: int) -> float:
 
 @shared
 def reset(block: Corrector) -> None:
-    """Law of `Corrector.reset`."""
+    """Computation of `Corrector.reset`."""
     block._integral_rad = 0.0
     block._filtered_radps = math.nan
 
@@ -153,7 +153,7 @@ class DesiredYawRate(NativeBlock):
 
 @shared
 def desired_yaw_rate(block: DesiredYawRate, front_steer_rad: float, speed_mps: float) -> float:
-    """Law of `DesiredYawRate.step`: the lagged desired yaw rate."""
+    """Computation of `DesiredYawRate.step`: the lagged desired yaw rate."""
     target = yaw_rate_gain(block._single_track, speed_mps) * front_steer_rad
     limit = block._limit_mps2 / (speed_mps if speed_mps > MIN_SPEED_MPS else MIN_SPEED_MPS)
     if target > limit:

@@ -300,7 +300,7 @@ def fed_back(
     pressures_Pa: PerWheel,
     own_brakes_Nm: PerWheel,
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Law of `Lqr.turn`, with the estimate and then the fields of `Turn`."""
+    """Computation of `Lqr.turn`, with the estimate and then the fields of `Turn`."""
     speed, friction = now[_SPEED], now[_FRICTION]
     certain, authority = confidence(block._confidence, innovation, now[_FRICTION_STD])
     if speed < MIN_SPEED_MPS:

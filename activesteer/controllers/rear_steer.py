@@ -62,7 +62,7 @@ class RearPrediction(NativeBlock):
 
 @shared
 def predicted(block: RearPrediction, front_steer_rad: float, speed_mps: float) -> float:
-    """Law of `RearPrediction.step`: the predicted rear angle."""
+    """Computation of `RearPrediction.step`: the predicted rear angle."""
     gain, lead_s, lag_s = rear_prediction(block._single_track, speed_mps)
     difference = front_steer_rad - block._state_rad
     angle = gain * block._state_rad + lead_s / lag_s * difference

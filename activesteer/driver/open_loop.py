@@ -73,7 +73,7 @@ class SpeedHold(NativeBlock):
 def drive_torque(
     hold: SpeedHold, speed_demand_mps: float, speed: float, engine_radps: float, low: float, high: float
 ) -> float:
-    """Law of `SpeedHold.step`."""
+    """Computation of `SpeedHold.step`."""
     if speed_demand_mps == 0.0 and abs(speed) < _STANDSTILL_MPS:
         take_foot_off(hold)
         return 0.0
@@ -105,7 +105,7 @@ def drive_torque(
 
 @shared
 def take_foot_off(hold: SpeedHold) -> None:
-    """Law of `SpeedHold.reset`."""
+    """Computation of `SpeedHold.reset`."""
     hold._integral_Nm = 0.0
     hold._pedal = 1.0
     hold.saturated = False
@@ -193,7 +193,7 @@ def turned(
     low_Nm: float,
     high_Nm: float,
 ) -> tuple[float, float, bool, int]:
-    """Law of `OpenLoopDriver.steer_to`, which also returns the gear and whether a limit is active."""
+    """Computation of `OpenLoopDriver.steer_to`, which also returns the gear and whether a limit is active."""
     saturated = False
     if angle > robot.steering_wheel_limit_rad:
         angle, saturated = robot.steering_wheel_limit_rad, True

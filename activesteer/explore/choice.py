@@ -60,7 +60,8 @@ class Folder:
         if courses is None:
             self.check_name("maneuver", choice.maneuver)
         elif choice.maneuver not in courses:
-            raise ParameterError(nearest_names(choice.maneuver, courses), key="maneuver", value=choice.maneuver)
+            problem = f"there is no course {shown(choice.maneuver)}; {nearest_names(choice.maneuver, courses)}"
+            raise ParameterError(problem, key="maneuver", value=choice.maneuver)
         self.check_name("vehicle", choice.vehicle)
         self.check_name("driver", choice.driver)
         for controller in choice.controllers:

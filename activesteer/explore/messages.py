@@ -89,7 +89,9 @@ _DECODER: Final = msgspec.json.Decoder(Message)
 def read(text: str | bytes) -> Message:
     """Return a message of the page."""
     if len(text) > MAX_MESSAGE_BYTES:
-        raise ParameterError(f"a message of the page has {len(text)} characters; allowed are {MAX_MESSAGE_BYTES}")
+        raise ParameterError(
+            f"a message of the page has {len(text)} characters; at most {MAX_MESSAGE_BYTES} are allowed"
+        )
     try:
         return _DECODER.decode(text)
     except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:

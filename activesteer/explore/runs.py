@@ -299,7 +299,7 @@ class Runs:
         return Reply({"kind": "saved", "files": [path.name for path in paths], "folder": folder})
 
     def driven(self) -> dict[str, Recording]:
-        """Return the recordings of the last runs by the names of their files in a report."""
+        """Return the recordings of the last runs, with the names of their files in a report as keys."""
         return {f"{_plain(name)}.mcap": recording for name, (_, recording) in self._runs().items()}
 
     def _runs(self) -> dict[str, tuple[str, Recording]]:

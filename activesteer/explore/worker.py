@@ -113,7 +113,7 @@ class _Worker:
             self._send(Reply({**ended.header, "error": _words(error)}))
 
     def _driven_run(self) -> dict[str, Recording]:
-        """Return the recording of the last drive by the name of its file."""
+        """Return the recording of the last drive, with the name of its file as the key."""
         if self._driven is None:
             raise ParameterError("there is no drive yet; drive first")
         return {self._driven.name: Recording.open(self._driven)}

@@ -195,7 +195,7 @@ def _tried(answers: Callable[[list[Array]], Sequence[Answer]], place: Array) -> 
     slopes: list[list[Array]] = [[] for _ in here]
     for beside, step in zip(there, steps, strict=True):
         if isinstance(beside, str):
-            raise StudyError(f"the car cannot be driven with values close to drivable parameters: {beside}")
+            raise StudyError(f"the car can be driven with some parameters, but not with values close to them: {beside}")
         for columns, side, series in zip(slopes, beside, here, strict=True):
             columns.append((side - series) / step)
     return here, [np.column_stack(columns) for columns in slopes]

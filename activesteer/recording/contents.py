@@ -230,7 +230,7 @@ def check_names(names: Sequence[Any], what: str, maximum: int) -> None:
     _count(len(names), maximum, what)
     for name in names:
         if not isinstance(name, str) or not 0 < len(name) <= 255 or not name.isprintable():
-            raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is not a name of 1 to 255 letters")
+            raise RecordingError(f"{what}: {name!r:.{_SHOWN}} is not a name of 1 to 255 printable characters")
 
 
 def check_bodies(names: Sequence[Any]) -> None:

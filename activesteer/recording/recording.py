@@ -235,7 +235,7 @@ class Recording:
         for name in (*self.channels.names, *self.metrics):
             if len(name) > _MATLAB_NAME_LENGTH:
                 raise RecordingError(
-                    f"{name!r} has {len(name)} letters; MATLAB allows {_MATLAB_NAME_LENGTH}",
+                    f"{name!r} has {len(name)} characters; MATLAB allows at most {_MATLAB_NAME_LENGTH}",
                     value=name,
                     allowed=_MATLAB_NAME_LENGTH,
                 )

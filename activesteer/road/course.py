@@ -202,7 +202,7 @@ class ProfileTable:
         check_points("s_m", self.s_m, tracks, Range(2), ManeuverError)
         for key, values in tracks.items():
             if any(abs(value) > _HIGHEST_M for value in values or ()):
-                raise ManeuverError(f"is higher than {_HIGHEST_M:g} m", key=key)
+                raise ManeuverError(f"has heights beyond +-{_HIGHEST_M:g} m, the largest allowed size", key=key)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
             raise ManeuverError(
                 f"is {self.s_m[-1] - self.s_m[0]:g} m long; at most {_MAX_LENGTH_M:g} m is allowed", key="s_m"

@@ -74,7 +74,7 @@ def unpacked(texts: tuple[str, ...]) -> CrgRoad:
     except (ValueError, zlib.error) as reason:
         raise ManeuverError(f"is damaged: {reason}", key="crg_data") from reason
     if not files:
-        raise ManeuverError("is empty", key="crg_data")
+        raise ManeuverError("is empty; the content of an OpenCRG file is needed", key="crg_data")
     return read_crg(next(iter(files)), files.__getitem__)
 
 
@@ -154,7 +154,11 @@ def _road(head: dict[str, float], mods: dict[str, float], definition: list[str],
         raise ManeuverError(f"has {len(sections)} long sections and {len(data)} rows; at least 2 of each are needed")
     places = _places(head, [columns[index] for index in sections]) * scale["scale_width"]
     if (np.diff(places) <= 0.0).any():
-        raise ManeuverError("the long sections do not run from right to left")
+        bad = int((np.diff(places) <= 0.0).argmax())
+        raise ManeuverError(
+            f"its long sections {bad + 1} and {bad + 2} are at {places[bad]:g} and {places[bad + 1]:g} m; "
+            "positions must increase from right to left"
+        )
     heights = _filled(data[:, sections], int(mods.get("grid_nan_mode", _KEEP_LAST)), mods.get("grid_nan_offset", 0.0))
     heights = heights * scale["scale_z_grid"]
     along = {name.removeprefix("reference line "): data[:, index] for index, name in enumerate(columns)}

@@ -87,6 +87,6 @@ def surface_in(metadata: Mapping[str, Any]) -> DrawnSurface | None:
     if len(s_m) < 2 or len(d_m) < 2 or len(rows) != len(s_m) or len(s_m) * len(d_m) > _MAX_PLACES:
         raise fail("surface", f"has {len(s_m)} s_m, {len(d_m)} d_m and {len(rows)} rows")
     if (np.diff(s_m) <= 0.0).any() or (np.diff(d_m) <= 0.0).any():
-        raise fail("surface", "has places that do not increase")
+        raise fail("surface", "has positions that do not increase")
     z_m = [numbers(row, f"surface.z_m.{index}", count=len(d_m)) for index, row in enumerate(rows)]
     return DrawnSurface(s_m, d_m, np.array(z_m))

@@ -74,7 +74,7 @@ def point_at(s, spacing, xs, ys, heading_first, heading_last):
 
 @compiled
 def _points_at(s, spacing, xs, ys, heading_first, heading_last):
-    """Law of `PathSearch.at`."""
+    """Computation of `PathSearch.at`."""
     x, y = np.empty(len(s)), np.empty(len(s))
     for index in range(len(s)):
         x[index], y[index] = point_at(s[index], spacing, xs, ys, heading_first, heading_last)
@@ -83,7 +83,7 @@ def _points_at(s, spacing, xs, ys, heading_first, heading_last):
 
 @compiled
 def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
-    """Law of `PathSearch.nearest`."""
+    """Computation of `PathSearch.nearest`."""
     count = math.ceil(2.0 * window / SPACING_M) + 1
     best, minimum, before, after = 0, math.inf, math.inf, math.inf
     previous = math.inf
@@ -103,7 +103,7 @@ def nearest(x, y, around, window, spacing, xs, ys, heading_first, heading_last):
 
 @compiled
 def _ahead(path, x, y, around, window, ahead, starts, xs, ys, ends):
-    """Law of `PathSearches.ahead`."""
+    """Computation of `PathSearches.ahead`."""
     along, px, py = np.empty(len(path)), np.empty(ahead.shape), np.empty(ahead.shape)
     for car, own in enumerate(path):
         own_xs, own_ys = xs[starts[own] : starts[own + 1]], ys[starts[own] : starts[own + 1]]

@@ -138,7 +138,9 @@ class Obstacle:
                 raise ManeuverError(f"has no effect on this {self.kind}; leave it out", key=key)
         right, left = self.borders
         if not right < left:
-            raise ManeuverError(f"the left border at {left:g} m is not left of the right one at {right:g} m")
+            raise ManeuverError(
+                f"left_m, {left:g} m, must be greater than right_m, {right:g} m: positions count to the left"
+            )
         if steep and self.length_m is not None and self.length_m < 2.0 * self.edge_m:
             raise ManeuverError(
                 f"is {self.length_m:g} m; two edges of edge_m = {self.edge_m:g} m need more", key="length_m"
@@ -202,7 +204,8 @@ class Roughness:
     def __post_init__(self) -> None:
         """Check that the band of spatial frequencies is not empty."""
         if not max(self.least_1pm, 1.0 / self.length_m) < self.greatest_1pm:
-            raise ManeuverError(f"is {self.greatest_1pm:g}, not above least_1pm and 1/length_m", key="greatest_1pm")
+            needed = f"above least_1pm, {self.least_1pm:g}, and 1/length_m, {1.0 / self.length_m:.3g}"
+            raise ManeuverError(f"is {self.greatest_1pm:g}; it must be {needed}", key="greatest_1pm")
 
     def grid(self) -> Grid:
         """Return the grid of heights."""

@@ -78,9 +78,13 @@ class BankingTable:
         """Check the points of the banking."""
         check_points("s_m", self.s_m, {"bank_deg": self.bank_rad}, Range(2, _MAX_POINTS), ManeuverError)
         if self.s_m[-1] - self.s_m[0] > _MAX_LENGTH_M:
-            raise ManeuverError(f"is longer than {_MAX_LENGTH_M:g} m", key="s_m")
+            raise ManeuverError(
+                f"is {self.s_m[-1] - self.s_m[0]:g} m long; at most {_MAX_LENGTH_M:g} m is allowed", key="s_m"
+            )
         if any(abs(bank) > math.pi / 4.0 for bank in self.bank_rad):
-            raise ManeuverError("is steeper than 45 deg", key="bank_deg")
+            raise ManeuverError(
+                "has a bank steeper than 45 deg; at most 45 deg to either side is allowed", key="bank_deg"
+            )
 
     def sampled(self) -> tuple[float, float, Array]:
         """Return the first position, the step [m] and the cross slopes."""
@@ -189,9 +193,14 @@ class Road:
             if others := [key for key in ("heights", "roughness", "banking") if getattr(self, key) is not None]:
                 raise ManeuverError(f"cannot be combined with {' and '.join(others)}", key="crg")
         elif self.crg is not None:
-            raise ManeuverError("is not read; build the road from a manoeuvre", key="crg")
+            raise ManeuverError(
+                "names a file, but only a manoeuvre reads the file; build the road from a manoeuvre", key="crg"
+            )
         if self.profile is not None and self.heights is None:
-            raise ManeuverError("is not read; build the road from a manoeuvre, or give heights", key="profile")
+            problem = (
+                "names a file, but only a manoeuvre reads the file; build the road from a manoeuvre, or give heights"
+            )
+            raise ManeuverError(problem, key="profile")
 
     @property
     def _is_gridded(self) -> bool:

@@ -76,7 +76,7 @@ class RunContext(NamedTuple):
         )
 
     def writer(self, path: Path) -> McapWriter:
-        """Open a file for rows."""
+        """Return the writer of a new recording file, which takes the rows of the run."""
         return McapWriter(path, self.channels, self.body_names, self.metadata, self.files, self.scene)
 
 

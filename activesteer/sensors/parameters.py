@@ -48,7 +48,7 @@ class Sensor:
         return not any(getattr(self, field.name) for field in fields(self))
 
     def amount(self, word: str) -> float:
-        """Return the value of the key with a prefix, in the unit of the sensor, or 0 if not given."""
+        """Return the value of the key that starts with `word`, in the unit of the sensor, or 0 if not given."""
         return next((getattr(self, field.name) for field in fields(self) if field.name.startswith(word)), None) or 0.0
 
 

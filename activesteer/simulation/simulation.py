@@ -328,7 +328,11 @@ class Simulation(Copyable):
             ManeuverError: the simulation is being driven.
         """
         if not 0 < len(what) <= MAX_EVENT_LETTERS:
-            raise ParameterError(f"has {len(what)} letters", key="what", allowed=Range(1, MAX_EVENT_LETTERS))
+            raise ParameterError(
+                f"has {len(what)} characters; 1 to {MAX_EVENT_LETTERS} are allowed",
+                key="what",
+                allowed=Range(1, MAX_EVENT_LETTERS),
+            )
         with self.loop.in_use:
             self._check_going_on()
             self._note("note", what)
@@ -463,7 +467,9 @@ class Simulation(Copyable):
             RecordingError: the file cannot be written.
         """
         if self.loop.step_count or self._writer is not None:
-            raise RecordingError("a run is recorded to one file, from its first step", key="path", value=path)
+            raise RecordingError(
+                "a run can be recorded to one file only, and only from its first step", key="path", value=path
+            )
         with self.context.writer(path) as self._writer:
             if self.events:
                 self._writer.write_events(self.events)

@@ -59,7 +59,10 @@ def two_track_of(vehicle: FileOrTable, run: Run, overrides: Mapping[str, Any] | 
     ay, roll = _channel(turned, "ay_mps2"), _channel(turned, "roll_rad")
     change_mps2 = _between_sides(turned, ay)
     if not change_mps2 > 2.0 * _LEAST_MPS2:
-        raise ModelError(f"the car turns with only {0.5 * change_mps2:.2g} m/s2 in a test for [two_track]")
+        raise ModelError(
+            f"the car turns with only {0.5 * change_mps2:.2g} m/s2 in a test for [two_track]; more than "
+            f"{_LEAST_MPS2:g} m/s2 are needed"
+        )
     arms_m = [
         _roll_arm(*_slip_and_motion(turned, axle, to_axle_m))
         for axle, to_axle_m in (

@@ -187,7 +187,7 @@ def _solve(plan):
 
 @inlined_by_llvm
 def _accelerate(plan):
-    """Compute the sensed accelerations, including gravity, which the engine does not compute again."""
+    """Compute the sensed accelerations, including gravity, because the engine does not compute them again."""
     if plan.sensed_body == 0:
         _engine(plan.mj_rnePostConstraint, plan)
         return

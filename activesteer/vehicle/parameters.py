@@ -383,7 +383,7 @@ def drive_limits(
     types.UniTuple(types.float64, 2), types.float64, types.intp, types.UniTuple(types.float64, 4), others_run=False
 )
 def _limits_Nm(speed_radps, gear, numbers):
-    """Law of `drive_limits`, called from Python."""
+    """Computation of `drive_limits`, called from Python."""
     return drive_limits(speed_radps, gear, *numbers)
 
 

@@ -177,7 +177,9 @@ def chassis_of(car: CarDesign, model: mujoco.MjModel, log: Log) -> Solid:
     cg = np.array([float(rear + table.front_fraction * (front - rear)), 0.0, table.cg_height_m])
     if mass < 0.3 * table.total_kg:
         raise ParameterError(
-            f"wheels, knuckles and rack weigh {others.mass_kg:.0f} kg of {table.total_kg:.0f} kg", key="mass.total_kg"
+            f"is {table.total_kg:.0f} kg, but wheels, knuckles and rack have {others.mass_kg:.0f} kg of it; at most "
+            f"{0.7 * table.total_kg:.0f} kg is allowed",
+            key="mass.total_kg",
         )
     chassis_cg = (table.total_kg * cg - others.mass_kg * others.cg_m) / mass
     chassis_cg[1] = 0.0

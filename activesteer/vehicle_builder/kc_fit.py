@@ -130,7 +130,7 @@ def _start(forces: Array, wanted: Array, weight: Array) -> Array:
 
 
 def _wanted(load: Load) -> Array:
-    """Return the motion without the compliance in series, shape (n, 5), with nan where not measured."""
+    """Return the measured motion minus the compliance in series, shape (n, 5), with nan where not measured."""
     moved = [np.full(len(load.x), np.nan) if (row := load.moved[name]) is None else row for name in COORDINATES]
     return np.stack(moved, axis=1) - np.outer(load.x, load.direction) @ load.beside.T
 

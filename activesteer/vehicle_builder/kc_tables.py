@@ -271,7 +271,9 @@ def _left_wheel(columns: dict[str, Array], name: str, file: Path) -> Samples:
     x = np.concatenate(xs)
     order = np.argsort(x, kind="stable")
     if not x[order[0]] < 0.0 < x[order[-1]]:
-        raise ParameterError(f"{test.variable} has no values on one side of 0", file=file.name)
+        raise ParameterError(
+            f"{test.variable} has no values on one side of 0; values on both sides are needed", file=file.name
+        )
     if (places := len(np.unique(x))) < _LEAST_POINTS:
         raise ParameterError(
             f"has {places} different values; at least {_LEAST_POINTS} are needed", file=file.name, key=test.variable

@@ -53,7 +53,7 @@ def test_claims_are_counted_in_words_as_in_the_table() -> None:
     text = guide("claims.md")
     every, paper, literature, ideal, production = cells(text.partition("| scenario | the paper")[2], "all |")
     words = " ".join(text.split())
-    assert f"{paper} of the {every} claims hold together" in words
+    assert f"{paper} of the {every} claims hold at the same time" in words
     assert f"from the literature, {literature} are reproduced" in words
     shares = f"{ideal} of the claims hold on average with ideal sensors, and {production} with production sensors"
     assert shares in words

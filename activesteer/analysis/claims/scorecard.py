@@ -78,7 +78,8 @@ class Setting:
 def read_setting(name: str) -> Setting:
     """Return a setting of the package, `paper` or `literature`."""
     if name not in SETTINGS:
-        raise ParameterError(nearest_names(name, SETTINGS), key="--setting", value=name, allowed=tuple(SETTINGS))
+        problem = f"there is no setting {name!r}; {nearest_names(name, SETTINGS)}"
+        raise ParameterError(problem, key="--setting", value=name, allowed=tuple(SETTINGS))
     if name == LITERATURE:
         return Setting()
     table, source = read_toml(Path(__file__).parent / f"{name}_setting.toml", ParameterError)

@@ -84,14 +84,14 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def _stands(recording: Recording) -> bool:
-    """Return whether a car never moves faster than at a walk."""
+    """Return whether a car never moves faster than at walking speed."""
     with suppress(RecordingError):
         return bool(np.nanmax(np.abs(recording["speed_mps"]), initial=0.0) < SLOWEST_MPS)
     return False
 
 
 def _is_zero(panel: Mapping[str, Any]) -> bool:
-    """Return whether all lines of a panel are zero, seen on its shortest axis."""
+    """Return whether all lines of a panel are negligibly small, compared with its shortest axis."""
     values = (value for line in panel["series"] for value in line["values"] if value is not None)
     return all(abs(value) < 1e-3 * panel["min_span"] for value in values)
 

@@ -114,7 +114,7 @@ def open_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Recording]:
     recordings: dict[str, Recording] = {}
     for path in paths:
         if str(path) in recordings:
-            raise ParameterError(f"{path} is given twice", value=path)
+            raise ParameterError(f"{path} is given twice; leave one out", value=path)
         recordings[str(path)] = Recording.open(Path(path), recover=True)
     return recordings
 

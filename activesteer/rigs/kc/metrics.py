@@ -186,7 +186,7 @@ def _left_right_difference(axle: Axle) -> float:
 
 
 def _support(axle: Axle, point: str) -> float:
-    """Slope of the path of a point in side view, forwards per upwards, times l/h [%]."""
+    """Slope of a point's path in side view (forwards per upwards) times wheelbase over centre of gravity height [%]."""
     sweep = axle.sweep("parallel_kinematic")
     slopes = axle.slope("parallel_kinematic", getattr(sweep, point)[..., 0], over=sweep.centre_m[..., 2])
     return 100.0 * wheelbase_mm(axle) / _cg_height(axle) * float(slopes.mean())

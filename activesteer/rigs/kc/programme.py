@@ -256,7 +256,7 @@ def rear_screw_travel_m(vehicle: Vehicle, angles_rad: Array) -> Array:
 
 
 def _steering_angles(vehicle: Vehicle) -> Array:
-    """Return steering wheel angles up to the first lock, denser about straight ahead."""
+    """Return steering wheel angles up to the nearer limit of wheel and rack, closely spaced near straight ahead."""
     model = vehicle.model
     rack = float(model.jnt_range[model.joint("rack").id, 1])
     per_angle = vehicle.rack_per_steering_wheel_m

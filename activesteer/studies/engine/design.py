@@ -156,7 +156,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         raise source.fail(where, f"is grid, but {other.key} is {other.kind}; give a grid there or another design")
     if kind in ("grid", "list"):
         if table.samples:
-            raise source.fail(("design", "samples"), f"belongs to a sample, not to a {kind}")
+            raise source.fail(("design", "samples"), f"has no effect on a {kind}; leave it out")
         _check_size(factors, 1, source)
         return replace(table, kind=kind, samples=0)
     if all_grids:

@@ -32,7 +32,8 @@ class FactorValues:
             for name in factor.maneuvers:
                 if name not in labels:
                     place = ("factors", factor.key, "maneuvers")
-                    raise study.source.fail(place, nearest_names(name, labels), name)
+                    problem = f"the study has no manoeuvre {shown(name)}; {nearest_names(name, labels)}"
+                    raise study.source.fail(place, problem, name)
             for other, wanted in factor.conditions.items():
                 place = ("factors", factor.key, "when", other)
                 if other not in self._factors:

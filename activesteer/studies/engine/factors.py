@@ -133,9 +133,9 @@ def read_factor(key: str, table: object, source: Source) -> Factor:
         if value in ([], {}, ""):
             raise source.fail((*where, name), "is empty", value)
     if given.of and given.nominal is None:
-        raise source.fail((*where, "of"), "names an earlier factor, and needs nominal", given.of)
+        raise source.fail((*where, "of"), "needs the key nominal of the same factor", given.of)
     if given.grows_with and given.nominal != "times":
-        raise source.fail((*where, "grows_with"), 'belongs to nominal = "times"', given.grows_with)
+        raise source.fail((*where, "grows_with"), 'has an effect only with nominal = "times"', given.grows_with)
     factor = Factor(**vars(given), key=key)
     if factor.values:
         _check_values(factor, source)
@@ -170,8 +170,8 @@ def _check_values(factor: Factor, source: Source) -> None:
     for value in given:
         if not is_plain(value):
             raise source.fail(where, f"{shown(value)} is not a number, string, true or false", value)
-    if any(given.count(value) > 1 for value in given):
-        raise source.fail(where, "a value is given twice")
+    if twice := [value for value in given if given.count(value) > 1]:
+        raise source.fail(where, f"{shown(twice[0])} is given twice; leave one out", twice[0])
     place = ("factors", factor.key, "weights")
     if weights and len(weights) != len(given):
         raise source.fail(place, f"as many weights as values are needed: {len(given)}")

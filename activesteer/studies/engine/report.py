@@ -180,7 +180,7 @@ def _factor(study: StudyFile, key: str, column: pa.ChunkedArray) -> dict[str, An
 
 
 def _label(study: StudyFile, key: str) -> tuple[str, str]:
-    """Return label and unit of a factor, from the code of a user's controller or driver where it declares them."""
+    """Return label and unit of a factor. For a parameter of a user's code, the code declares the unit."""
     words, unit = parameter_label(key)
     with contextlib.suppress(ActiveSteerError):  # the code may be elsewhere by now
         for plugin in (*map(controller_spec, study.controllers), driver_spec(study.driver)):

@@ -95,7 +95,7 @@ def read_table(study: StudyFile) -> TuneTable:
         for key, value in seed.items():
             place = (TABLE, "seeds", str(number), key)
             if key not in factors:
-                raise source.fail(place, nearest_names(key, factors), key)
+                raise source.fail(place, f"is not a factor of the study; {nearest_names(key, factors)}", key)
             if not _is_in(factors[key], value):
                 problem = f"{shown(value)} is outside the range of the factor; allowed: {shown(factors[key].extremes)}"
                 raise source.fail(place, problem, value)

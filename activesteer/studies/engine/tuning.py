@@ -19,7 +19,7 @@ from typing import Any, Final
 
 from activesteer.analysis.requirement import ANY, Names, Requirement
 from activesteer.core.files import file_word, finite, make_folder, reading, write_text
-from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed
+from activesteer.errors import ParameterError, StudyError, nearest_names, not_installed, shown
 from activesteer.scenario import FileOrTable
 from activesteer.studies.engine.analysis import without_effect
 from activesteer.studies.engine.factor_values import Plausibility
@@ -167,13 +167,14 @@ def _searches(
     if table.goal is not Goal.VIOLATE:
         for option, given in {"--controller": controllers, "--maneuver": maneuvers}.items():
             if given:
-                raise ParameterError("belongs to a search with the goal violate", key=option, value=given)
+                raise ParameterError("has an effect only in a search with the goal violate", key=option, value=given)
         return [_Search(replace(study, metrics=()), table, folder)]
     if len(study.vehicles) > 1:
         raise study.source.fail(("vehicles",), "a search for a violation needs one vehicle")
     for name in maneuvers or ():
         if name not in labels:
-            raise ParameterError(nearest_names(name, labels), key="--maneuver", value=name, allowed=tuple(labels))
+            problem = f"the study has no manoeuvre {shown(name)}; {nearest_names(name, labels)}"
+            raise ParameterError(problem, key="--maneuver", value=name, allowed=tuple(labels))
     found = []
     for name, maneuver in itertools.product(controllers or study.controllers, maneuvers or labels):
         own = label_of(name)

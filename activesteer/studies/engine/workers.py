@@ -28,7 +28,7 @@ _MOST_JOBS: Final = 16
 
 
 class Workers:
-    """Worker in this process, which executes every task at once.
+    """Worker in this process, which executes every task immediately.
 
     Others override its methods.
 
@@ -59,7 +59,7 @@ class Workers:
         return check(*arguments)
 
     def close(self, *, abandon: bool) -> None:
-        """End the workers, without waiting for their tasks if abandoned."""
+        """End the workers. With `abandon`, do not wait for their tasks."""
 
 
 class LocalProcesses(Workers):
@@ -99,7 +99,7 @@ class LocalProcesses(Workers):
         self._pool = self._new_pool()
 
     def close(self, *, abandon: bool) -> None:
-        """End the pool, and terminate its processes if abandoned."""
+        """End the pool. With `abandon`, terminate its processes."""
         if abandon:
             for process in list((self._pool._processes or {}).values()):
                 process.terminate()
@@ -260,7 +260,7 @@ def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str |
         raise ParameterError(f"must be 1 to {most}", key=f"--jobs {jobs}", value=jobs, allowed=Range(1, most))
     if jobs is not None and scheduler is not None:
         raise ParameterError(
-            "has no effect with --scheduler, whose workers do all of it", key=f"--jobs {jobs}", value=jobs
+            "has no effect with --scheduler, whose workers carry out all runs", key=f"--jobs {jobs}", value=jobs
         )
     with contextlib.ExitStack() as stack:
         if client is None and scheduler is not None:

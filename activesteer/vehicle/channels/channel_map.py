@@ -53,7 +53,7 @@ class ChannelMap:
     """
 
     def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
-        """Look up everything by name, once."""
+        """Look up the parts of the model by name, once."""
         self._gravity_mps2 = model.opt.gravity
         self._motion_copied, self._motion_inputs = motion_copied(model), motion_inputs(model)
         measured = () if parameters.sensors.is_ideal else MEASURED
