@@ -429,7 +429,11 @@ def _elements(
     """Convert a list of numbers or of tables."""
     element = element_of(hint)
     if not isinstance(raw, (list, tuple)):
-        wanted = "not a list of numbers" if element is None else f"not a list; tables [[{'.'.join(path)}]] are needed"
+        wanted = (
+            "not a list of numbers, such as [0.0, 0.5]"
+            if element is None
+            else f"not a list; tables [[{'.'.join(path)}]] are needed"
+        )
         raise source.fail(path, f"{shown(raw)} is {wanted}", raw)
     if element is not None:
         return tuple(convert(element, value, 1.0, source, (*path, str(number))) for number, value in enumerate(raw))
