@@ -109,6 +109,11 @@ def test_the_rigid_solution_is_sensitive_to_what_it_checks() -> None:
     assert np.abs(toe - [pose.steer_deg for pose in poses]).max() > 0.05
 
 
+def test_a_car_with_a_hinge_has_no_screw_to_sweep() -> None:
+    assert compact().curves
+    assert "rear_steering_bump" not in compact().curves
+
+
 @pytest.mark.parametrize("corner", ["fl", "rl"])
 def test_wheel_rate_by_virtual_work(corner: str) -> None:
     """Load = (spring force x di/dz + weight of the unsprung parts) / contact point's rise; the rate is its slope."""
