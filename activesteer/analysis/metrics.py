@@ -64,9 +64,14 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
     return {name: value for part in all_parts for name, value in part.items()}
 
 
+def stands(recording: RecordingLike) -> bool:
+    """Return whether a car stands in the whole run."""
+    return float(np.abs(recording["speed_mps"]).max()) <= _STANDING_MPS
+
+
 def _displacement_at_rest(recording: RecordingLike) -> dict[str, float]:
     """Return how far a standing car moves, or nothing for a car that drives."""
-    if float(np.abs(recording["speed_mps"]).max()) > _STANDING_MPS:
+    if not stands(recording):
         return {}
     moved_m = np.hypot(*(recording[name] - recording[name][0] for name in ("x_m", "y_m")))
     return {"displacement_at_rest_m": float(moved_m.max())}

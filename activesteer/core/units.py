@@ -222,8 +222,9 @@ _NEGATIVE: Final = re.compile(r"(?<![\w.)\]-])-(?=[\d.])")
 
 
 def typeset(text: str) -> str:
-    """Typeset numbers in a string: minus signs, no minus before zero, and m/s²."""
-    return _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace("m/s2", "m/s²")
+    """Typeset numbers in a string: minus and plus-minus signs, no minus before zero, and m/s²."""
+    signed = _NEGATIVE.sub("\N{MINUS SIGN}", unsigned_zeros(text)).replace(" +- ", " \N{PLUS-MINUS SIGN} ")
+    return signed.replace("m/s2", "m/s²")
 
 
 def three_digits(value: float) -> str:

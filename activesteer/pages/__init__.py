@@ -54,7 +54,7 @@ def _environment() -> Environment:
 
 
 def _typeset(text: Text) -> Text:
-    return text if isinstance(text, Markup) else typeset(text).replace(" +- ", " \N{PLUS-MINUS SIGN} ")
+    return text if isinstance(text, Markup) else typeset(text)
 
 
 def _unbroken(text: Text) -> Text:

@@ -152,7 +152,7 @@ class SingleTrack(NativeBlock):
             k = (J_z (C_V + C_H) + m (C_V l_V^2 + C_H l_H^2)) / (C_V C_H l^2),
 
         with its maximum at (v / v_ch)^2 = (sqrt(k^2 + 8 k k_z) - k) / (2 k_z) - 1. The lag of a neutral car grows with
-        its speed without limit, and the result is infinite.
+        its speed without limit. Then, and if the lag is nowhere positive, the result is infinite: no limit.
         """
         p = self.parameters
         cv, ch, lv, lh = p.front_stiffness_Nprad, p.rear_stiffness_Nprad, p.cg_to_front_m, p.cg_to_rear_m

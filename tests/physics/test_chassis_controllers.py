@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import activesteer
+from activesteer.controllers.lqr import Lqr
 
 PRODUCTION = {"sensors.preset": "production", "sensors.seed": 1}
 
@@ -47,8 +48,8 @@ def test_step_at_low_speed_is_answered_no_later_than_without_control(speed_kmh):
         activesteer.simulate("step_steer", name, overrides=keys).metrics["yaw_rate_response_time_s"]
         for name in ("none", "lqr")
     )
-    # Without the limit of the lag, the answer is 11 to 40 ms later.
-    assert found_s <= free_s + 0.006
+    # Within one call of the controller. Without the limit of the lag, the answer is 40 and 13 ms later.
+    assert found_s <= free_s + Lqr.interval_s
 
 
 def test_rear_wheels_that_stick_in_mid_manoeuvre_leave_no_yaw_rate():

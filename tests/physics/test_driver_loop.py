@@ -26,9 +26,9 @@ ALWAYS_ACTIVE = {
 FRICTIONLESS = {"vehicle.friction.rack_N": 0.0}
 
 
-@pytest.fixture(scope="module")
-def loops() -> list[LoopAtSpeed]:
-    return driver_loops(speeds_kmh=[100.0])
+@pytest.fixture(scope="module", params=[100.0, pytest.param(80.0, marks=pytest.mark.slow)])
+def loops(request: pytest.FixtureRequest) -> list[LoopAtSpeed]:
+    return driver_loops(speeds_kmh=[request.param])
 
 
 def test_typical_driver_and_car_are_damped_by_a_quarter(loops):

@@ -83,8 +83,7 @@ def test_a_car_of_soft_front_tyres_is_not_steered_over_the_limit_of_a_turn_on_sn
     assert np.abs(controlled["sideslip_rad"][before]).max() < math.radians(1.0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("controller", ["integrated", "lqr"])
+@pytest.mark.parametrize("controller", ["integrated", pytest.param("lqr", marks=pytest.mark.slow)])
 def test_a_loaded_car_of_worn_rear_tyres_is_not_steered_over_its_limit_in_a_turn(controller: str):
     """The turn of the nominal car needs 7.4 m/s2, and the rear tyres bear 6.9. Its rear axle slid, or it spun."""
     pytest.importorskip("daqp")

@@ -10,13 +10,13 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.lanes import front_axle, path_distance, struck_cones, view_of
+from activesteer.analysis.metrics import stands
 from activesteer.analysis.report.groups import MOST_EVENTS, Group, ReportedRun
 from activesteer.analysis.series import changed_friction
 from activesteer.analysis.sine_with_dwell import marks
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.core.conventions import Array
 from activesteer.drawing import wheel_angles
-from activesteer.drawing.cars import SLOWEST_MPS
 from activesteer.drawing.panels import PATH_DISTANCE, REPORT, Panel, panels_in
 from activesteer.errors import RecordingError
 from activesteer.recording import Recording
@@ -58,8 +58,8 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
     """Return the plots of a group as JSON values."""
     grid = time_grid([run.recording.time_s for run in group.runs])
     panels = [shown for panel in panels_in(view) if (shown := _panel(panel, view, group.runs, grid))["series"]]
-    stands = view == REPORT and all(_stands(run.recording) for run in group.runs)
-    zero = [shown["title"] for shown in panels if stands and _is_zero(shown)]
+    at_rest = view == REPORT and all(_stands(run.recording) for run in group.runs)
+    zero = [shown["title"] for shown in panels if at_rest and _is_zero(shown)]
     return {
         "name": group.name,
         "step_s": float(grid[1] - grid[0]) if len(grid) > 1 else 0.0,
@@ -84,9 +84,9 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
 
 
 def _stands(recording: Recording) -> bool:
-    """Return whether a car never moves faster than at walking speed."""
+    """Return whether a recording has a speed, and its car stands."""
     with suppress(RecordingError):
-        return bool(np.nanmax(np.abs(recording["speed_mps"]), initial=0.0) < SLOWEST_MPS)
+        return stands(recording)
     return False
 
 
