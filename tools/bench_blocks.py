@@ -1,16 +1,22 @@
-"""Time of each block of the loop on its own, called from Python, and of sensors, brakes and anti-lock system together.
+"""Times of parts of a step: blocks called from Python, controllers in the loop, and the engine with both solvers.
 
-    python tools/bench_blocks.py
+    python tools/bench_blocks.py                            # docs/performance.md: blocks, sensors and brakes
+    python tools/bench_blocks.py controllers                # docs/performance.md: additional time of each controller
+    python tools/bench_blocks.py engine compact sedan ...   # docs/engine.md: MuJoCo's solver and the direct solution
+    python tools/bench_blocks.py accuracy compact sedan     # docs/engine.md: tolerances of MuJoCo's solver
 
-The times are those of docs/performance.md; `activesteer bench` measures whole runs.
+`activesteer bench` measures whole runs.
 """
 
 from __future__ import annotations
 
+import sys
 import time
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from activesteer.core.conventions import CORNERS
 from activesteer.native.compilation import compiled
@@ -20,7 +26,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.recorder import Recorder
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.benchmark import per_call_us
+from activesteer.studies.benchmark import KeptInputs, closed_loop_us, per_call_us
 from activesteer.vehicle.brakes.brake_control_unit import step_brakes
 
 _CALLS: Final = 5000
@@ -109,8 +115,83 @@ def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
     return held
 
 
-if __name__ == "__main__":
+_PYTHON: Final = ("esc", "tv", "ars_sideslip", "observer", "integrated")
+"""Controllers of the package in Python."""
+_PRODUCTION: Final = {"sensors.preset": "production"}
+
+
+def print_blocks() -> None:
+    """Print the time of each block, and of sensors, brakes and anti-lock system together."""
     scenario, stop = with_amplitude_found(resolve("step_steer")), DrivenStop()
     rounds = [{**blocks(scenario), "sensors_and_brakes_us": stop.step_us()} for _ in range(_ROUNDS)]
     for name in rounds[0]:
         print(f"{name:28} {min(times[name] for times in rounds):8.2f}")
+
+
+def print_controllers() -> None:
+    """Print the additional time per step of the step steer of each controller in Python, with production sensors."""
+    compact = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
+    motors = with_amplitude_found(resolve("step_steer", "compact_electric", overrides=_PRODUCTION))
+    cars = {name: motors if name == "tv" else compact for name in _PYTHON}
+    found = {
+        name: [
+            min(times)
+            for times in zip(
+                *((closed_loop_us(car, "none"), closed_loop_us(car, name)) for _ in range(_ROUNDS)), strict=True
+            )
+        ]
+        for name, car in cars.items()
+    }
+    for name, (without_us, with_us) in found.items():
+        print(f"{name:14} {with_us - without_us:6.2f} us in addition to {without_us:.1f} us")
+
+
+def print_engine(vehicles: Sequence[str]) -> None:
+    """Print the engine's time per step in the first 1.5 s of three manoeuvres, with MuJoCo's solver and directly."""
+    for vehicle in vehicles:
+        for maneuver in ("step_steer", "slalom", "sine_with_dwell"):
+            driven = KeptInputs(with_amplitude_found(resolve(maneuver, vehicle)), 1500)
+            plan = driven.vehicle._implicit.plan
+            best = {}
+            for _ in range(_ROUNDS):
+                for direct in (0, 1):
+                    plan["direct"] = direct
+                    best[direct] = min(best.get(direct, np.inf), driven.replay_us())
+            print(f"{vehicle:20} {maneuver:16} {best[0]:6.1f} {best[1]:6.1f} us")
+
+
+def _positions_m(driven: KeptInputs) -> NDArray[np.float64]:
+    """Return the position of the chassis after each step [m], shape (steps, 3)."""
+    driven.vehicle.restore_state(driven.start)
+    positions_m = np.empty((len(driven.inputs), 3))
+    for row, inputs in zip(positions_m, driven.inputs, strict=True):
+        driven.vehicle.replay(inputs[None])
+        row[:] = driven.vehicle.data.qpos[:3]
+    return positions_m
+
+
+def print_accuracy(vehicles: Sequence[str]) -> None:
+    """Print time per step and error of the position after 2.5 s of slalom, for tolerances of MuJoCo's solver."""
+    for vehicle in vehicles:
+        driven = KeptInputs(resolve("slalom", vehicle), 2500)
+        model, plan = driven.vehicle.model, driven.vehicle._implicit.plan
+        best_us = min(driven.replay_us() for _ in range(_ROUNDS))
+        exact = _positions_m(driven)
+        print(f"{vehicle:16} direct {best_us:6.1f} us")
+        plan["direct"] = 0
+        for exponent in (13, 12, 10, 8, 6, 5, 4, 3):
+            model.opt.tolerance = 10.0**-exponent
+            best_us = min(driven.replay_us() for _ in range(_ROUNDS))
+            error_m = np.linalg.norm(_positions_m(driven) - exact, axis=1).max()
+            print(f"{vehicle:16} 1e-{exponent:<4} {best_us:6.1f} us {error_m:8.0e} m")
+
+
+if __name__ == "__main__":
+    table, *vehicles = sys.argv[1:] or ["blocks"]
+    tables = {
+        "blocks": lambda _: print_blocks(),
+        "controllers": lambda _: print_controllers(),
+        "engine": print_engine,
+        "accuracy": print_accuracy,
+    }
+    tables[table](vehicles)

@@ -44,24 +44,24 @@ def bench(rounds: int = ROUNDS) -> dict[str, float]:
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
     sensed = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
-    driven, along_path_driven = _KeptInputs(scenario), _KeptInputs(along_path)
+    driven, along_path_driven = KeptInputs(scenario), KeptInputs(along_path)
     with tempfile.TemporaryDirectory() as folder:
         stages: dict[str, Callable[[], float]] = {
             "bare_step_us": lambda: _engine(scenario, forces=False),
             "plant_step_us": lambda: _engine(scenario, forces=True),
             "engine_step_us": driven.replay_us,
             "path_engine_step_us": along_path_driven.replay_us,
-            "closed_loop_step_us": lambda: _closed_loop(scenario),
-            "path_following_step_us": lambda: _closed_loop(along_path),
+            "closed_loop_step_us": lambda: closed_loop_us(scenario),
+            "path_following_step_us": lambda: closed_loop_us(along_path),
             "with_file_step_us": lambda: _with_file(scenario, Path(folder) / "bench.mcap"),
-            "sedan_step_us": lambda: _closed_loop(sedan),
-            "own_controller_us": lambda: _closed_loop(scenario, _Nothing),
-            "estimator_lqr_us": lambda: _closed_loop(sensed, "lqr"),
-            "production_step_us": lambda: _closed_loop(sensed),
-            "two_threads_step_us": lambda: _closed_loop(scenario, threads=2),
+            "sedan_step_us": lambda: closed_loop_us(sedan),
+            "own_controller_us": lambda: closed_loop_us(scenario, _Nothing),
+            "estimator_lqr_us": lambda: closed_loop_us(sensed, "lqr"),
+            "production_step_us": lambda: closed_loop_us(sensed),
+            "two_threads_step_us": lambda: closed_loop_us(scenario, threads=2),
         }
         if importlib.util.find_spec("daqp") is not None:
-            stages["integrated_us"] = lambda: _closed_loop(sensed, "integrated")
+            stages["integrated_us"] = lambda: closed_loop_us(sensed, "integrated")
         best = {name: min(measured) for name, measured in _interleaved(stages, rounds).items()}
     for name in {"integrated_us", "estimator_lqr_us"} & best.keys():
         best[name] -= best["production_step_us"]
@@ -117,22 +117,22 @@ def _engine(scenario: Scenario, *, forces: bool) -> float:
         install_native_forces()
 
 
-class _KeptInputs:
+class KeptInputs:
     """A run with stored inputs of the engine."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, steps: int | None = None) -> None:
         loop = ClosedLoop(scenario, _CONTROLLER)
         self.vehicle = loop.vehicle
-        self._start = self.vehicle.save_state()
-        self._inputs = np.empty((loop.steps, self.vehicle.model.nu))
-        for inputs in self._inputs:
+        self.start = self.vehicle.save_state()
+        self.inputs = np.empty((loop.steps if steps is None else steps, self.vehicle.model.nu))
+        for inputs in self.inputs:
             loop.advance(1)
             inputs[:] = self.vehicle.data.ctrl
 
     def replay_us(self) -> float:
         """Return the engine's time per step when the stored inputs are replayed in one native call [us]."""
-        self.vehicle.restore_state(self._start)
-        return per_call_us(self.vehicle.replay, 1, self._inputs) / len(self._inputs)
+        self.vehicle.restore_state(self.start)
+        return per_call_us(self.vehicle.replay, 1, self.inputs) / len(self.inputs)
 
 
 class _Nothing:
@@ -142,7 +142,7 @@ class _Nothing:
         return ActuatorCommand()
 
 
-def _closed_loop(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
+def closed_loop_us(scenario: Scenario, controller: Any = _CONTROLLER, threads: int = 0) -> float:
     """Return the time per step of one run, or of several in separate threads [us]."""
     loops = [ClosedLoop(scenario, controller) for _ in range(max(threads, 1))]
     recorders = [Recorder(loop.vehicle, loop.steps) for loop in loops]

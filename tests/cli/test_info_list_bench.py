@@ -139,7 +139,7 @@ def test_bench_has_the_promised_keys_and_ratios(call, monkeypatch):
     driven = SimpleNamespace(vehicle=SimpleNamespace(timestep_s=0.001), replay_us=None)
     for name, instead in {
         "with_amplitude_found": lambda scenario: scenario,
-        "_KeptInputs": lambda _: driven, "_runs_per_min": lambda: 100.0,
+        "KeptInputs": lambda _: driven, "_runs_per_min": lambda: 100.0,
     }.items():  # fmt: skip
         monkeypatch.setattr(f"activesteer.studies.benchmark.{name}", instead)
     told = call("bench", "--rounds", "1", "--json")
