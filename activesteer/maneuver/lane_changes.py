@@ -345,7 +345,7 @@ class ConeRow:
     """The row of cones along x and the path past it."""
 
     spacing_m: Annotated[float, Range(5.0, 200.0)] = 36.0
-    """Distance between cones [m]; 18 and 30.5 m (100 ft) are common, 36 m suits 100 km/h."""
+    """Distance between cones [m]; 18 and 30.5 m (100 ft) are common."""
     count: Annotated[int, Range(2, 100)] = 6
     """Number of cones."""
     offset_m: Annotated[float, Range(0.0, 10.0)] = 1.15
