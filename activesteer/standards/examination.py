@@ -129,31 +129,63 @@ def examination_page(result: Examination) -> Page:
     lead: list[Text] = [car + f". {result.date.isoformat()}."]
     versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
     lead.append(Markup('<span class="quiet">{}</span>').format(versions))
-    rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
-    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if len(rows) > 1 else []
-    together = _together(result.findings)
-    if together:
-        sections.append(Section("All controllers", pictures=list(together.values())))
+    several = len(result.findings) > 1
+    rows = [
+        (name, _verdict(found), Markup("<br>").join(typeset(found.error or found.summary).split("; ")))
+        for name, found in result.findings.items()
+    ]
+    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if several else []
+    compared, together = _side_by_side(result.findings), _together(result.findings)
+    if compared or together:
+        sections += [Section("All controllers"), *_parts(list(compared.values()), list(together.values()))]
     for name, found in result.findings.items():
         mark = ":" if found.error or found.passed is None else ""  # none after a chip
         first, *others = (found.error or typeset(found.summary)).split(". ")
         words = [Markup("{}{} {}.").format(_verdict(found), mark, first), *(f"{other}." for other in others)]
-        own = [picture for picture in found.pictures if picture.title not in together]
-        # A table and the plots of the same runs stand together.
-        shared = {table.title for table in found.tables} & {picture.title for picture in own}
-        tables = [table for table in found.tables if table.title not in shared]
-        pictures = [picture for picture in own if picture.title not in shared]
-        sections.append(Section(name, words, tables, pictures=pictures))
-        for table in found.tables:
-            if table.title in shared:
-                drawn = [picture._replace(title="") for picture in own if picture.title == table.title]
-                sections.append(Section(table.title, tables=[table._replace(title="")], pictures=drawn, level=3))
+        own = _parts(
+            [table for table in found.tables if table.title not in compared],
+            [picture for picture in found.pictures if picture.title not in together],
+        )
+        # The first table has the words of several controllers.
+        if own or not several:
+            sections += [Section(name, [] if several else words), *own]
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),
         Section("Not implemented", points=standard.left_out, level=3),
     ]
     return Page(f"{standard.name}: {result.vehicle}", standard.title, lead, sections)
+
+
+def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section]:
+    """Return a subsection for each title: a table and the plots of the same runs stand together."""
+    parts = []
+    for title in dict.fromkeys(part.title for part in (*tables, *pictures)):
+        own = [table for table in tables if table.title == title]
+        drawn = [picture._replace(title="" if own else title) for picture in pictures if picture.title == title]
+        parts.append(Section(tables=own, pictures=drawn, level=3))
+    return parts
+
+
+def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
+    """Return the tables of metrics of several controllers by title, with columns for each controller."""
+    shown = {name: {table.title: table for table in found.tables} for name, found in findings.items() if found.tables}
+    found = {}
+    for title in next(iter(shown.values()), {}) if len(shown) > 1 else ():
+        alike = {name: tables[title] for name, tables in shown.items() if title in tables}
+        if len(alike) < len(shown) or any(table.columns[1:2] != ("unit",) for table in alike.values()):
+            continue
+        columns = ["", "unit"]
+        rows: dict[str, list[Text]] = {}
+        for name, table in alike.items():
+            runs, missing = table.columns[2:], ["-"] * (len(columns) - 2)
+            for metric, unit, *cells in table.rows:
+                rows.setdefault(str(metric), [metric, unit, *missing]).extend(cells)
+            columns += [f"{name}, {run}" for run in runs] if len(runs) > 1 else [name] * len(runs)
+            for row in rows.values():
+                row.extend(["-"] * (len(columns) - len(row)))
+        found[title] = Table(title, columns, list(rows.values()))
+    return found
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
