@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -116,6 +117,8 @@ def examine(
 _WIDE, _THIN, _LINE = 3.6, 1.0, 1.4
 """Widths of the first and of the second curve of a controller, and of a single curve [pt]. Both sides may coincide."""
 _SIDES: Final = 2
+_BESIDE: Final = 8
+"""Largest number of runs whose metrics stand side by side."""
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
@@ -131,17 +134,14 @@ def examination_page(result: Examination) -> Page:
     lead.append(Markup('<span class="quiet">{}</span>').format(versions))
     several = len(result.findings) > 1
     rows = [
-        (name, _verdict(found), Markup("<br>").join(typeset(found.error or found.summary).split("; ")))
+        (name, _verdict(found), Markup("<br>").join(re.split("[.;] ", typeset(found.error or found.summary))))
         for name, found in result.findings.items()
     ]
     sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if several else []
     compared, together = _side_by_side(result.findings), _together(result.findings)
     if compared or together:
         sections += [Section("All controllers"), *_parts(list(compared.values()), list(together.values()))]
-    for name, found in result.findings.items():
-        mark = ":" if found.error or found.passed is None else ""  # none after a chip
-        first, *others = (found.error or typeset(found.summary)).split(". ")
-        words = [Markup("{}{} {}.").format(_verdict(found), mark, first), *(f"{other}." for other in others)]
+    for found, (name, *words) in zip(result.findings.values(), rows, strict=True):
         own = _parts(
             [table for table in found.tables if table.title not in compared],
             [picture for picture in found.pictures if picture.title not in together],
@@ -173,7 +173,12 @@ def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
     found = {}
     for title in next(iter(shown.values()), {}) if len(shown) > 1 else ():
         alike = {name: tables[title] for name, tables in shown.items() if title in tables}
-        if len(alike) < len(shown) or any(table.columns[1:2] != ("unit",) for table in alike.values()):
+        runs = sum(len(table.columns) - 2 for table in alike.values())
+        if (
+            len(alike) < len(shown)
+            or runs > _BESIDE
+            or any(table.columns[1:2] != ("unit",) for table in alike.values())
+        ):
             continue
         columns = ["", "unit"]
         rows: dict[str, list[Text]] = {}

@@ -307,7 +307,7 @@ class Player {
     Object.assign(this.slider, { min: first, max: last });
   }
 
-  tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2)} s`; }
+  tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2).replace("-", "−")} s`; }
 }
 
 const short = (value) => `${+value.toPrecision(3)}`.replace("-", "−");

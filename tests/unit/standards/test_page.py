@@ -9,7 +9,7 @@ from dataclasses import replace
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.catalogue import Standard
-from activesteer.standards.examination import Examination, _together, examination_page
+from activesteer.standards.examination import Examination, _side_by_side, _together, examination_page
 from activesteer.standards.standard import Findings, metrics_table
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
@@ -70,6 +70,7 @@ def test_metrics_of_several_controllers_stand_side_by_side_once():
     assert list(table.columns) == ["", "unit", "none, left", "none, right", "ars, left", "ars, right"]
     assert [[cell[:1] for cell in row[2:]] for row in table.rows] == [["1", "1", "2", "2"], ["-", "-", "3", "3"]]
     assert [section.tables[0].title for section in others if section.tables] == ["Own", "Own"]
+    assert _side_by_side({str(number): findings(cones_hit=1.0) for number in range(5)}) == {}  # ten columns
 
 
 def test_overlaid_controllers_share_their_pictures_and_sides_differ_in_width():
