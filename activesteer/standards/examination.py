@@ -168,28 +168,21 @@ def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section
 
 
 def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
-    """Return the tables of metrics of several controllers by title, with columns for each controller."""
+    """Return the tables of metrics of several controllers by title, with a column for each run."""
     shown = {name: {table.title: table for table in found.tables} for name, found in findings.items() if found.tables}
     found = {}
     for title in next(iter(shown.values()), {}) if len(shown) > 1 else ():
         alike = {name: tables[title] for name, tables in shown.items() if title in tables}
-        runs = sum(len(table.columns) - 2 for table in alike.values())
-        if (
-            len(alike) < len(shown)
-            or runs > _BESIDE
-            or any(table.columns[1:2] != ("unit",) for table in alike.values())
-        ):
-            continue
-        columns = ["", "unit"]
-        rows: dict[str, list[Text]] = {}
-        for name, table in alike.items():
-            runs, missing = table.columns[2:], ["-"] * (len(columns) - 2)
-            for metric, unit, *cells in table.rows:
-                rows.setdefault(str(metric), [metric, unit, *missing]).extend(cells)
-            columns += [f"{name}, {run}" for run in runs] if len(runs) > 1 else [name] * len(runs)
-            for row in rows.values():
-                row.extend(["-"] * (len(columns) - len(row)))
-        found[title] = Table(title, columns, list(rows.values()))
+        runs = {
+            f"{name}, {run}" if len(table.columns) > 3 else name: {tuple(row[:2]): row[place] for row in table.rows}
+            for name, table in alike.items()
+            for place, run in enumerate(table.columns[2:], 2)
+            if table.columns[1] == "unit"
+        }
+        if len(alike) == len(shown) and 0 < len(runs) <= _BESIDE:
+            heads = dict.fromkeys(head for cells in runs.values() for head in cells)
+            rows = [(*head, *(cells.get(head, "-") for cells in runs.values())) for head in heads]
+            found[title] = Table(title, ("", "unit", *runs), rows)
     return found
 
 
