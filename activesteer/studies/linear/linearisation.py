@@ -455,7 +455,7 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         notes.append((0.0, radius, f"{frequency_Hz} Hz"))
     for damping in DAMPING_RAYS:
         x, y = -limit * damping, limit * math.sqrt(1.0 - damping**2)
-        curves.append(Curve([0.0, x], [0.0, y], "", _GREY, "-", 0.7))
+        curves.append(Curve([0.0, 1.05 * x], [0.0, 1.05 * y], "", _GREY, "-", 0.7))
         notes.append((_BEYOND * x, _BEYOND * y, f"{damping:g}"))
     slowest, fastest = 3.6 * min(speeds_mps), 3.6 * max(speeds_mps)
     found = [[pole for pole in _named_poles(system) if abs(pole[1]) <= limit] for system in systems]
