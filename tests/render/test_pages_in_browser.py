@@ -298,6 +298,20 @@ def test_the_extreme_runs_of_a_study_are_listed_with_their_factors(shown, tmp_pa
 
 
 @pytest.mark.slow
+def test_the_chosen_metric_of_a_study_is_not_among_the_other_metrics(shown, tmp_path):
+    page = shown(of_study(tmp_path), **DESK)
+    others = page.locator("section.part", has_text="Other metrics").locator("figcaption b").all_inner_texts()
+    assert others
+    chosen = page.locator(".choices select").last
+    assert chosen.evaluate("(list) => list.selectedOptions[0].textContent") not in others
+    chosen.select_option(label=others[0])
+    assert (
+        others[0]
+        not in page.locator("section.part", has_text="Other metrics").locator("figcaption b").all_inner_texts()
+    )
+
+
+@pytest.mark.slow
 def test_points_of_controllers_stand_side_by_side_where_a_factor_has_few_values(shown, tmp_path):
     page = shown(of_study(tmp_path), **DESK)
     places = page.evaluate("""() => drawn.filter(({ panel }) => panel.x === "speed [km/h]" && panel.curves.length === 2)

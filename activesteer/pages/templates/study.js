@@ -222,7 +222,7 @@ function drawGroup() {
     found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), ...factors.map((factor) => driven(factor, run)), replayLine(command)])), true, "runs, with factors and commands");
   const constant = [], others = [];
   for (const other of DATA.metrics) {
-    if (!DATA.by_group[group][other.name]) continue;
+    if (other === metric || !DATA.by_group[group][other.name]) continue; // the chosen one is above
     const known = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
     const claim = /^claim_(\w+)$/.exec(other.name);
     if (other.name === "claims_failed") continue; // the claims themselves follow
@@ -233,7 +233,8 @@ function drawGroup() {
       others.push({ ...panel, title: other.label, name: other.name });
     }
   }
-  begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
+  if (!constant.length && !others.length) return;
+  begin("Other metrics", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   others.sort((a, b) => firstPlace(a.name) - firstPlace(b.name));
   show("first", others.splice(0, others.filter(({ name }) => DATA.first.includes(name)).length || 4));
   if (others.length) body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} more metrics`)));
