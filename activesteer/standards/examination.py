@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from markupsafe import Markup
 
 from activesteer.core.conventions import run_looks
@@ -144,7 +145,7 @@ def examination_page(result: Examination) -> Page:
     for found, (name, *words) in zip(result.findings.values(), rows, strict=True):
         own = _parts(
             [table for table in found.tables if table.title not in compared],
-            [picture for picture in found.pictures if picture.title not in together],
+            [picture for picture in found.pictures if picture.title not in together and not _is_empty(picture)],
         )
         # The first table has the words of several controllers.
         if own or not several:
@@ -165,6 +166,11 @@ def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section
         drawn = [picture._replace(title="" if own else title) for picture in pictures if picture.title == title]
         parts.append(Section(tables=own, pictures=drawn, level=3))
     return parts
+
+
+def _is_empty(picture: Picture) -> bool:
+    """Return whether a picture has no point, as that of runs that failed at once."""
+    return not any(isinstance(panel, Heat) or any(np.size(it.x) for it in panel.curves) for panel in picture.panels)
 
 
 def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:

@@ -58,6 +58,12 @@ def test_a_table_stands_above_the_plots_of_its_runs():
     assert parts == [[2, [], []], [3, ["Circle"], [""]], [3, ["Limits"], []], [3, [], ["Track"]]]
 
 
+def test_runs_that_fail_at_once_have_no_empty_plots():
+    nothing = Picture("Stop", [Panel("x", "y", [Curve([], [])]), Panel("x", "z")])
+    page = examination_page(replace(examination("word"), findings={"none": Findings({}, "", (), [nothing])}))
+    assert not any(section.pictures for section in page.sections)
+
+
 def test_metrics_of_several_controllers_stand_side_by_side_once():
     def findings(**metrics: float) -> Findings:
         table = metrics_table("Circle", {side: metrics for side in ("left", "right")})
