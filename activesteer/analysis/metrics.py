@@ -222,6 +222,7 @@ KEY_METRICS: Final[dict[str, tuple[str, ...]]] = {
 """Metrics that are printed first and compared with the baseline, by kind of manoeuvre, most important first."""
 _ON_A_PATH: Final[dict[str, str]] = _TABLE["key_figures"]["titles_on_a_path"]
 _PATH: Final = "track_deviation_max_m"
+_AT_REST: Final = "displacement_at_rest_m"
 _TITLES: Final[dict[str, str]] = _TABLE["key_figures"]["titles"]
 KEY_FIGURES: Final = {
     _TITLES.get(names[0], metric(names[0]).label[0].upper() + metric(names[0]).label[1:]): tuple(names)
@@ -232,7 +233,9 @@ KEY_FIGURES: Final = {
 
 def key_figures_of(names: Collection[str]) -> dict[str, str]:
     """Return the key figures among the metrics of a run: titles and names of metrics."""
-    found = {title: next(filter(names.__contains__, of), "") for title, of in KEY_FIGURES.items()}
+    # A car at rest has no direction of motion.
+    shown = [name for name in names if not (_AT_REST in names and name.startswith("sideslip"))]
+    found = {title: next(filter(shown.__contains__, of), "") for title, of in KEY_FIGURES.items()}
     return {_ON_A_PATH.get(name, title) if _PATH in names else title: name for title, name in found.items() if name}
 
 

@@ -91,7 +91,7 @@ def picture(
         simulated._replace(width=_WIDE),
         line(found.measured, "measured" if runs == 1 else f"measured, mean of {runs}", RUN_COLOURS[1]),
     ]
-    residual = [line(found.residual)]
+    residual = [line(found.residual, "" if start is None else "difference after the fit")]
     if start is not None:
         overlay.append(line(start, "at the start", _START, ":"))
         residual.append(line(found.measured - start, "", _START, ":"))
@@ -268,9 +268,8 @@ def fit_page(found: Fit, name: str) -> Page:
         "as stated."
     ]
     lead += [Markup('<span class="failed">{}</span>').format(_sentence(note)) for note in found.notes]
-    sections = [Section(tables=[_parameter_table(found)])]
-    if len(found.parameters) > 1:
-        sections.append(Section("Correlation of their errors", tables=[_correlation_table(found)]))
+    correlation = _correlation_table(found)._replace(title="Correlation of their errors")
+    tables = [_parameter_table(found), *([correlation] if len(found.parameters) > 1 else [])]
     columns = [
         "recording", "channel", "stated noise", "rms at the start", "rms at the end", "samples", "independent samples",
     ]  # fmt: skip
@@ -281,7 +280,7 @@ def fit_page(found: Fit, name: str) -> Page:
         numbers = (f"{shown.factor * size:.3g} {shown.unit.name}" for size in sizes)
         samples = (f"{len(each.measured)}", f"{each.independent:.0f}")
         rows.append((each.recording, shown.label, *numbers, *samples))
-    sections.append(Section("Remaining differences", tables=[Table("", columns, rows)]))
+    sections = [Section(tables=[*tables, Table("Remaining differences", columns, rows)])]
     for recording, compared in groupby(found.compared, lambda each: each.recording):
         sections.append(Section(f"Recording {recording}", pictures=[*map(_fit_picture, compared)]))
     sections.append(Section("Assumptions", points=rests_on(found)))

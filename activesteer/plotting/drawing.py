@@ -118,7 +118,7 @@ def _fill(axis: Axes, panel: Panel) -> None:
     for value, label in panel.limits:
         axis.axhline(value, color=_LIMIT, lw=1.0, ls=(0, (4, 2)), label=label)
     for x, y, text in panel.notes:
-        beside: dict[str, Any] = {"xytext": (6, 0), "va": "center"} if panel.names else {"xytext": (0, -2), "va": "top"}
+        beside: dict[str, Any] = {"xytext": (6, 0), "va": "center"} if panel.names else {"xytext": (0, -4), "va": "top"}
         aside = "left" if panel.names else "center"
         axis.annotate(text, (x, y), textcoords="offset points", ha=aside, fontsize="xx-small", **beside)
     _set_axes(axis, panel)

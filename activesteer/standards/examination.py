@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import datetime
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from markupsafe import Markup
 
 from activesteer.core.conventions import run_looks
@@ -116,6 +118,8 @@ def examine(
 _WIDE, _THIN, _LINE = 3.6, 1.0, 1.4
 """Widths of the first and of the second curve of a controller, and of a single curve [pt]. Both sides may coincide."""
 _SIDES: Final = 2
+_BESIDE: Final = 8
+"""Largest number of runs whose metrics stand side by side."""
 _PALE: Final = 0.55
 """Share of white in the colour of the wide curve."""
 
@@ -129,31 +133,63 @@ def examination_page(result: Examination) -> Page:
     lead: list[Text] = [car + f". {result.date.isoformat()}."]
     versions = ", ".join(f"{name} {version}" for name, version in result.versions.items())
     lead.append(Markup('<span class="quiet">{}</span>').format(versions))
-    rows = [(name, _verdict(found), found.error or found.summary) for name, found in result.findings.items()]
-    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if len(rows) > 1 else []
-    together = _together(result.findings)
-    if together:
-        sections.append(Section("All controllers", pictures=list(together.values())))
-    for name, found in result.findings.items():
-        mark = ":" if found.error or found.passed is None else ""  # none after a chip
-        first, *others = (found.error or typeset(found.summary)).split(". ")
-        words = [Markup("{}{} {}.").format(_verdict(found), mark, first), *(f"{other}." for other in others)]
-        own = [picture for picture in found.pictures if picture.title not in together]
-        # A table and the plots of the same runs stand together.
-        shared = {table.title for table in found.tables} & {picture.title for picture in own}
-        tables = [table for table in found.tables if table.title not in shared]
-        pictures = [picture for picture in own if picture.title not in shared]
-        sections.append(Section(name, words, tables, pictures=pictures))
-        for table in found.tables:
-            if table.title in shared:
-                drawn = [picture._replace(title="") for picture in own if picture.title == table.title]
-                sections.append(Section(table.title, tables=[table._replace(title="")], pictures=drawn, level=3))
+    several = len(result.findings) > 1
+    rows = [
+        (name, _verdict(found), Markup("<br>").join(re.split("[.;] ", typeset(found.error or found.summary))))
+        for name, found in result.findings.items()
+    ]
+    sections = [Section(tables=[Table("", ["controller", "result", ""], rows)])] if several else []
+    compared, together = _side_by_side(result.findings), _together(result.findings)
+    if compared or together:
+        sections += [Section("All controllers"), *_parts(list(compared.values()), list(together.values()))]
+    for found, (name, *words) in zip(result.findings.values(), rows, strict=True):
+        own = _parts(
+            [table for table in found.tables if table.title not in compared],
+            [picture for picture in found.pictures if picture.title not in together and not _is_empty(picture)],
+        )
+        # The first table has the words of several controllers.
+        if own or not several:
+            sections += [Section(name, [] if several else words), *own]
     sections += [
         Section("Scope of this implementation", [standard.edition]),
         Section("Implemented", points=standard.implemented, level=3),
         Section("Not implemented", points=standard.left_out, level=3),
     ]
     return Page(f"{standard.name}: {result.vehicle}", standard.title, lead, sections)
+
+
+def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section]:
+    """Return a subsection for each title: a table and the plots of the same runs stand together."""
+    parts = []
+    for title in dict.fromkeys(part.title for part in (*tables, *pictures)):
+        own = [table for table in tables if table.title == title]
+        drawn = [picture._replace(title="" if own else title) for picture in pictures if picture.title == title]
+        parts.append(Section(tables=own, pictures=drawn, level=3))
+    return parts
+
+
+def _is_empty(picture: Picture) -> bool:
+    """Return whether a picture has no point, as that of runs that failed at once."""
+    return not any(isinstance(panel, Heat) or any(np.size(it.x) for it in panel.curves) for panel in picture.panels)
+
+
+def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
+    """Return the tables of metrics of several controllers by title, with a column for each run."""
+    shown = {name: {table.title: table for table in found.tables} for name, found in findings.items() if found.tables}
+    found = {}
+    for title in next(iter(shown.values()), {}) if len(shown) > 1 else ():
+        alike = {name: tables[title] for name, tables in shown.items() if title in tables}
+        runs = {
+            f"{name}, {run}" if len(table.columns) > 3 else name: {tuple(row[:2]): row[place] for row in table.rows}
+            for name, table in alike.items()
+            for place, run in enumerate(table.columns[2:], 2)
+            if table.columns[1] == "unit"
+        }
+        if len(alike) == len(shown) and 0 < len(runs) <= _BESIDE:
+            heads = dict.fromkeys(head for cells in runs.values() for head in cells)
+            rows = [(*head, *(cells.get(head, "-") for cells in runs.values())) for head in heads]
+            found[title] = Table(title, ("", "unit", *runs), rows)
+    return found
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:

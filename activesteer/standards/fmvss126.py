@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from activesteer.analysis.sine_with_dwell import DISPLACEMENT_TIME_S, INSTANTS_S, RATIO_LIMITS
 from activesteer.analysis.step_response import FIT, REFERENCE_MPS2
-from activesteer.pages import Table
+from activesteer.pages import Table, Text, failed
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.standard import SIDES, Findings, NoResult, StandardRun, StandardRunner, cell
 
@@ -53,9 +53,13 @@ def verdict(row: Mapping[str, float], least_m: float) -> list[str]:
         for name, after_s, limit in zip(RATIOS, INSTANTS_S, RATIO_LIMITS, strict=True)
         if not abs(row[name]) <= limit
     ]
-    if row["factor"] >= DISPLACED_FROM - 1e-9 and not row["displacement_m"] >= least_m:
+    if _too_short(row, least_m):
         broken.append(f"displacement {row['displacement_m']:.2f} m ({least_m:.2f} m needed)")
     return broken
+
+
+def _too_short(row: Mapping[str, float], least_m: float) -> bool:
+    return row["factor"] >= DISPLACED_FROM - 1e-9 and not row["displacement_m"] >= least_m
 
 
 def examine(runner: StandardRunner) -> Findings:
@@ -124,6 +128,9 @@ def _summary(series: list[dict[str, Any]], broken: list[list[str]]) -> str:
 
 
 def _table(series: list[dict[str, Any]], runs: list[StandardRun], least_m: float) -> Table:
+    def marked(value: str, broken: bool) -> Text:
+        return failed(value) if broken and value != "-" else value
+
     limits = zip(INSTANTS_S, RATIO_LIMITS, strict=True)
     columns = (
         "first direction", "amplitude [A]", "amplitude [deg]",
@@ -134,8 +141,9 @@ def _table(series: list[dict[str, Any]], runs: list[StandardRun], least_m: float
     rows = [
         (
             row["direction"], f"{row['factor']:.2f}", f"{row['amplitude_deg']:.1f}",
-            *(cell(100.0 * row[name], 1) for name in RATIOS),
-            cell(row["displacement_m"], 2),
+            *(marked(cell(100.0 * row[name], 1), not abs(row[name]) <= limit)
+              for name, limit in zip(RATIOS, RATIO_LIMITS, strict=True)),
+            marked(cell(row["displacement_m"], 2), _too_short(row, least_m)),
             "pass" if row["pass"] else f"fail {run.error}".strip(),
         )
         for row, run in zip(series, runs, strict=True)
@@ -165,8 +173,12 @@ def _pictures(series: list[dict[str, Any]], runs: list[StandardRun], least_m: fl
         ]  # fmt: skip
         return Panel("amplitude [A]", label, curves, limits=(limit,))
 
+    needed = f"{least_m:.2f} m needed from {DISPLACED_FROM:g} A on"
     scale = ("amplitude [A]", FIRST_FACTOR, last)
-    limits = [(100.0 * limit, f"{100.0 * limit:.0f} % allowed") for limit in RATIO_LIMITS]
+    limits = [
+        (100.0 * limit, f"{100.0 * limit:.0f} % allowed after {instant_s:.2f} s")
+        for limit, instant_s in zip(RATIO_LIMITS, INSTANTS_S, strict=True)
+    ]
     return [
         Picture("Yaw rate", [panel("yaw_rate_radps", "yaw rate [deg/s]", side) for side in SIDES], scale),
         Picture(
@@ -176,7 +188,7 @@ def _pictures(series: list[dict[str, Any]], runs: list[StandardRun], least_m: fl
                     over_amplitude(name, f"after {instant_s:.2f} s [%]", 100.0, limit)
                     for name, instant_s, limit in zip(RATIOS, INSTANTS_S, limits, strict=True)
                 ),
-                over_amplitude("displacement_m", "displacement [m]", 1.0, (least_m, f"{least_m:.2f} m from 5 A on")),
+                over_amplitude("displacement_m", "displacement [m]", 1.0, (least_m, needed)),
             ],
         ),
     ]

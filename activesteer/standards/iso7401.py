@@ -81,7 +81,8 @@ def examine(runner: StandardRunner) -> Findings:
     left = steps["left"]
     bandwidth_Hz = sweep.metric("yaw_rate_bandwidth_Hz")
     summary = (
-        f"step of {STEP_MPS2:g} m/s²: yaw rate response time {left.metric('yaw_rate_response_time_s'):.3f} s, "
+        f"step of {STEP_MPS2:g} m/s², {angle_deg:.1f} deg: "
+        f"yaw rate response time {left.metric('yaw_rate_response_time_s'):.3f} s, "
         f"overshoot {100.0 * left.metric('yaw_rate_overshoot'):.1f} %, "
         f"TB factor {math.degrees(left.metric('tb_srad')):.2f} s deg; yaw rate bandwidth "
         + (f"above {HIGHEST_Hz:g} Hz" if math.isnan(bandwidth_Hz) else f"{bandwidth_Hz:.2f} Hz")
@@ -109,7 +110,7 @@ def examine(runner: StandardRunner) -> Findings:
         },
     }
     tables = [
-        metrics_table(f"Step, {angle_deg:.1f} deg", {f"to the {side}": run.metrics for side, run in steps.items()}),
+        metrics_table("Step", {side: run.metrics for side, run in steps.items()}),
         metrics_table("Sine sweep", {"sweep": sweep.metrics}),
         _coherence_table(found, weak),
     ]

@@ -272,6 +272,55 @@ def test_two_fingers_zoom_all_curves_and_a_double_tap_shows_the_whole_run(
 
 
 @pytest.mark.slow
+def test_the_knob_stays_in_its_pad_and_a_finger_that_scrolls_leaves_the_friction(
+    browser: Browser, served: tuple[str, Path]
+) -> None:
+    page, problems = opened(browser, served[0], **PHONE)
+    page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)
+    page.tap("#tab-drive")
+    pad = page.evaluate(BOX, "touch-steer")
+    for way in (1, -1):
+        page.evaluate(f"activesteerDrive.steer({way})")
+        knob = page.locator("#touch-steer i").bounding_box()
+        assert knob
+        assert pad["left"] <= knob["x"]
+        assert knob["x"] + knob["width"] <= pad["right"]
+    slider = page.locator("#drive-mu")
+    before = slider.input_value()
+    slider.evaluate("""(slider) => {
+      slider.dispatchEvent(new Event("pointerdown"));
+      slider.value = 0.15; slider.dispatchEvent(new Event("input"));
+      slider.dispatchEvent(new Event("pointercancel"));
+    }""")
+    assert slider.input_value() == before
+    assert float(page.inner_text("label:has(#drive-mu) output")) == float(before)
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
+def test_curves_of_a_row_stand_at_one_height_and_zero_ones_of_a_standing_car_are_named(
+    browser: Browser, served: tuple[str, Path]
+) -> None:
+    tops = "(all) => all.map((one) => one.getBoundingClientRect().top)"
+    page, problems = opened(
+        browser, served[0] + "#maneuver=step_steer&controllers=none,lqr", viewport={"width": 1440, "height": 900}
+    )
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    heights = page.locator("#curves [role=img]").evaluate_all(tops)
+    # Of eight or more plots, one may stand next to the table and one alone in the last row.
+    assert len(heights) >= 8
+    assert len(set(heights)) <= len(heights) // 2 + 1
+    page.goto("about:blank")
+    page.goto(served[0] + "#maneuver=standstill&controllers=none")
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert page.locator("#curves [role=img]").count() == 1
+    assert "Zero throughout, at rest: steering wheel angle, yaw rate" in page.inner_text("#curves")
+    assert "sideslip" not in page.inner_text("#figures")
+    assert problems == []
+    page.close()
+
+
 def test_two_thumbs_steer_and_accelerate_at_the_same_time(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], **PHONE)
     page.wait_for_selector("#maneuver option", state="attached", timeout=LIMIT_MS)

@@ -208,6 +208,21 @@ def test_plots_in_a_row_stand_at_one_height_below_names_of_any_length(shown, tmp
     tops = page.locator(".uplot").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
     assert heads[0] < heads[1]
     assert tops[0] == tops[1]
+    page.set_viewport_size({"width": 688, "height": 900})
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    tops = page.locator(".uplot").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
+    assert tops[0] == tops[1]
+
+
+def test_many_plots_and_a_long_table_are_folded_on_a_phone_below_what_they_are(shown, tmp_path):
+    picture = Picture("", [Panel("x [m]", "y [m]", [Curve([0.0, 1.0], [0.0, 1.0])])] * 6)
+    table = Table("Modes", ["name", "value"], [["a", "1"]] * 9)
+    path = write_page(Page("all", "Fold", [], [Section(tables=[table], pictures=[picture])]), tmp_path / "f.html")
+    page = shown(path, **PHONE)
+    assert page.locator("summary:visible").all_inner_texts()[:2] == ["Modes 9 rows", "6 plots"]
+    assert page.locator("figure:visible, tbody:visible").count() == 0
+    assert shown(path, **DESK).locator("figure:visible, tbody:visible").count() == 7
 
 
 # Texts of the fields of a chart: ordinate and baseline, middle of the field [px], and colours of both.
@@ -275,6 +290,34 @@ def test_the_extreme_runs_of_a_study_are_listed_with_their_factors(shown, tmp_pa
         "(all) => all.map((one) => one.textContent)"
     )
     assert set(values) == {"70", "80"}
+    assert page.locator("details:has(table) > summary", has_text="runs, with factors and commands").count() == 1
+    page.evaluate("begin('Commands'); tableOf(['run', 'command'], [['1', replayLine('activesteer run slalom')]])")
+    assert page.locator(".controls:visible").count() == 2
+    page.emulate_media(media="print")  # a button is of no use on paper
+    assert page.locator(".controls:visible").count() == 0
+
+
+@pytest.mark.slow
+def test_the_chosen_metric_of_a_study_is_not_among_the_other_metrics(shown, tmp_path):
+    page = shown(of_study(tmp_path), **DESK)
+    others = page.locator("section.part", has_text="Other metrics").locator("figcaption b").all_inner_texts()
+    assert others
+    chosen = page.locator(".choices select").last
+    assert chosen.evaluate("(list) => list.selectedOptions[0].textContent") not in others
+    chosen.select_option(label=others[0])
+    assert (
+        others[0]
+        not in page.locator("section.part", has_text="Other metrics").locator("figcaption b").all_inner_texts()
+    )
+
+
+@pytest.mark.slow
+def test_points_of_controllers_stand_side_by_side_where_a_factor_has_few_values(shown, tmp_path):
+    page = shown(of_study(tmp_path), **DESK)
+    places = page.evaluate("""() => drawn.filter(({ panel }) => panel.x === "speed [km/h]" && panel.curves.length === 2)
+      .map(({ panel }) => panel.curves.map(({ x }) => Math.min(...x)))""")
+    assert places
+    assert all(left < 70.0 < right for left, right in places)
 
 
 @pytest.mark.slow

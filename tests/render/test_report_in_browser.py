@@ -180,7 +180,7 @@ def test_pointing_at_a_run_makes_the_others_pale(open_page):
     page = open_page(**DESK)
     yaw_rate = plot(page, "Yaw rate")
     before = [pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3]]
-    page.locator("#group-1 button", has_text="2 active rear steering").hover()
+    page.locator("#group-1 button", has_text="ars: active rear steering").hover()
     none, ars, afs = (pixels(yaw_rate, colour) for colour in RUN_COLOURS[:3])
     assert (none, afs) == (0, 0)
     assert ars >= before[1]

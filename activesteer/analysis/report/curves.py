@@ -58,7 +58,7 @@ def plots(group: Group, view: str = REPORT) -> dict[str, Any]:
     """Return the plots of a group as JSON values."""
     grid = time_grid([run.recording.time_s for run in group.runs])
     panels = [shown for panel in panels_in(view) if (shown := _panel(panel, view, group.runs, grid))["series"]]
-    at_rest = view == REPORT and all(_stands(run.recording) for run in group.runs)
+    at_rest = all(_stands(run.recording) for run in group.runs)
     zero = [shown["title"] for shown in panels if at_rest and _is_zero(shown)]
     return {
         "name": group.name,

@@ -21,7 +21,7 @@ from activesteer.analysis.harm import failures, kept
 from activesteer.analysis.path_following import as_far_as_driven, judged_metrics
 from activesteer.analysis.source import entry
 from activesteer.analysis.step_response import without_response
-from activesteer.core.conventions import SYSTEM_LABELS, RunLook, run_looks
+from activesteer.core.conventions import RunLook, run_looks
 from activesteer.core.metric_table import SIDESLIP_PEAKS, metric
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.recording import Recording
@@ -137,9 +137,9 @@ def groups_of(recordings: Mapping[str, Recording]) -> list[Group]:
 def _group(name: str, recordings: Mapping[str, Recording], *, paper: bool) -> Group:
     named = dict(zip(run_names(list(recordings), recordings.values()), recordings.items(), strict=True))
     looks = run_looks(named)
-    if len(looks) == 1 and (label := SYSTEM_LABELS.get(run := next(iter(looks)))):
-        looks[run] = looks[run]._replace(label=label[2:])  # its number would read as the number of a run
-    runs = tuple(ReportedRun(*named[run], run, look) for run, look in looks.items())
+    # As in the tables, a run has its name; the label of a system explains the name, without the paper's number.
+    labels = {run: run if look.label == run else f"{run}: {look.label[2:]}" for run, look in looks.items()}
+    runs = tuple(ReportedRun(*named[run], run, look._replace(label=labels[run])) for run, look in looks.items())
     title = entry(runs[0].recording, "maneuver", "title") or name
     return Group(name, f"{title}: {SETTINGS[PAPER]}" if paper else title, runs)
 

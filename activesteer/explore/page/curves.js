@@ -54,13 +54,17 @@ export class Curves {
       this.panel(title, panelOf, lines, data);
     }
     this.tellSlip();
+    this.zero ??= element("p", { class: "quiet" });
+    this.zero.textContent = zeroTold([...new Set(all.flatMap(([, run]) => run.plots.zero ?? []))].filter((title) => !titles.includes(title)));
+    this.zero.hidden = !this.zero.textContent;
+    this.box.append(this.zero); // below all curves
     this.again();
   }
 
   // Let another part of the grid be as high as some rows of curves.
   besides(part) {
     const row = HEIGHT + 36, columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length;
-    part.style.gridRow = columns > 1 ? `span ${Math.max(1, Math.round(part.firstElementChild.offsetHeight / row))}` : "";
+    part.style.gridRow = columns > 1 ? `span ${3 * Math.max(1, Math.round(part.firstElementChild.offsetHeight / row))}` : "";
   }
 
   // New curves have their scales in the next frame.

@@ -1,5 +1,5 @@
 // The tab Drive: keys, gamepad and touch in; the car, its ghost, gauges and cones out.
-import { courses, element, explained, inWords, number, offer, option, small } from "./look.js";
+import { courses, element, explained, inWords, number, offer, option, small, undoScroll } from "./look.js";
 import { Scene } from "./scene.js";
 
 const $ = (id) => document.getElementById(id);
@@ -48,7 +48,9 @@ export class Drive {
     $("drive-vehicle").addEventListener("change", () => this.prepare());
     $("drive-controller").addEventListener("change", () => this.control($("drive-controller").value));
     for (const [id, write] of [["drive-speed", () => this.hold()], ["drive-mu", () => { this.scene.tint(+$("drive-mu").value); this.start_mu = +$("drive-mu").value; this.act({ mu: this.start_mu }); this.compared = false; }]]) {
-      $(id).addEventListener("input", () => { this.values(); write(); });
+      const moved = () => { this.values(); write(); };
+      $(id).addEventListener("input", moved);
+      undoScroll($(id), moved);
       $(id).addEventListener("change", () => { if (!this.running) { this.startAt(+$("drive-speed").value, +$("drive-mu").value); this.prepare(); } });
     }
     for (const [id, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]]) $("drive-speed").addEventListener(id, () => { this.held = held; });

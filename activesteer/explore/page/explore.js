@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { colourCount, dark, element, explained, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems } from "./look.js";
+import { colourCount, dark, element, explained, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems, undoScroll } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -348,10 +348,7 @@ function sliderOf(slider) {
     take(+input.value, false);
   });
   input.value = state.values[slider.key] ?? slider.value;
-  // A finger that turns out to scroll has moved nothing.
-  let before = null;
-  input.addEventListener("pointerdown", () => { before = input.value; });
-  input.addEventListener("pointercancel", () => { input.value = before ?? input.value; moved(false); });
+  undoScroll(input, () => moved(false));
   input.addEventListener("input", () => moved(true));
   input.addEventListener("change", () => moved(false));
   input.addEventListener("dblclick", () => { input.value = slider.value; moved(false); });

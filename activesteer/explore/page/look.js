@@ -44,6 +44,12 @@ export function explained(name, titles) {
   const title = (titles[name] ?? "").split(/[:;]| \(/)[0];
   return title ? `${name}: ${title.replace(/^[A-Z](?=[a-z ])/, (letter) => letter.toLowerCase())}` : name;
 }
+// A finger on a slider that turns out to scroll has moved nothing.
+export function undoScroll(slider, moved) {
+  let before = null;
+  slider.addEventListener("pointerdown", () => { before = slider.value; });
+  slider.addEventListener("pointercancel", () => { slider.value = before ?? slider.value; moved(); });
+}
 export const option = (name, text = inWords(name)) => element("option", { value: name }, text);
 // Choose a name in a list; the program answers a name that it does not know.
 export function offer(list, name) {

@@ -61,13 +61,14 @@ const drawn = [];
 
 const POINTS = { o: "M13 3a1 1 0 1 0 2 0a1 1 0 1 0-2 0z", D: "M14 1.5l1.5 1.5-1.5 1.5-1.5-1.5z", x: "M11.5 .5l5 5m0-5l-5 5" };
 // A swatch of a line, of a point, or of an area with the opacity `filled`.
-function swatchOf(colour, dashes, marker = "", filled = null) {
+function swatchOf(colour, dashes, marker = "", filled = null, width = 0) {
   const swatch = document.createElementNS(SVG, "svg");
   swatch.setAttribute("class", "swatch");
   swatch.setAttribute("viewBox", "0 0 28 6");
   swatch.style.setProperty("--run", colour);
   const line = swatch.appendChild(document.createElementNS(SVG, "path"));
   if (filled != null) { line.setAttribute("d", "M.5 .5h27v5h-27z"); Object.assign(line.style, { fill: colour, fillOpacity: filled, strokeWidth: 1 }); return swatch; }
+  if (width > 3) line.style.strokeWidth = 5; // a wide line beneath a thin one
   line.setAttribute("d", marker ? POINTS[marker] ?? POINTS.o : "M0 3h28");
   if (marker) line.style.fill = colour; else line.setAttribute("stroke-dasharray", dashes.join(" "));
   return swatch;
@@ -171,7 +172,8 @@ class Chart {
     const columns = this.holder.parentElement.classList.contains("wide") ? 1 : this.picture.panels.length === 3 ? 3 : 2;
     const room = width == null ? this.holder.clientWidth : (width - (columns - 1) * PRINTED_GAP) / columns;
     // Rows with names keep their height on paper, as far as it goes, because their texts have their size there too.
-    const height = width == null ? this.height : this.panel.names.length ? Math.min(this.height, PRINTED_MOST) : Math.round(0.5 * this.height);
+    const share = this.panel.equal ? 0.75 : this.panel.row_px ? 0.55 : this.panel.names.length ? 1 : 0.5;
+    const height = width == null ? this.height : Math.min(Math.round(share * this.height), PRINTED_MOST);
     if (room > 0 && (room !== this.plot.width || width != null)) { this.plot.setSize({ width: room, height }); this.whole(); }
   }
 
@@ -225,14 +227,18 @@ class Chart {
     ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
     for (const [value] of panel.limits) level(py(value));
     // Names and values of low rows, as on paper, are small, so that they do not meet.
-    const low = panel.names.length && py(1) - py(0) < LOW_ROW * dpr;
+    const low = panel.names.length && py(1) - py(0) < (panel.row_px ? 2 : 1) * LOW_ROW * dpr;
     ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${(low ? 9 : 12) * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
       ctx.fillStyle = colour || paint.ink;
       // The value of a field is in its middle; another note hangs below its point.
       ctx.textBaseline = colour ? "middle" : "top";
-      if (!panel.names.length) { ctx.fillText(text, px(x), py(y) + (colour ? 1 : 3) * dpr); continue; }
+      if (!panel.names.length) {
+        if (!colour) { ctx.strokeStyle = paint.paper; ctx.lineWidth = 3 * dpr; ctx.setLineDash([]); ctx.strokeText(text, px(x), py(y) + 5 * dpr); } // a line behind it ends at it
+        ctx.fillText(text, px(x), py(y) + (colour ? 1 : 5) * dpr);
+        continue;
+      }
       // A point in a row has its value beside it, where there is room.
       const before = px(x) > bbox.left + 0.8 * bbox.width;
       ctx.textAlign = before ? "right" : "left"; ctx.textBaseline = "middle";
@@ -275,6 +281,7 @@ class Player {
     this.row = element("div", { class: "player" }, this.button, this.slider, this.clock);
     this.button.addEventListener("click", () => this.play(!this.playing));
     this.slider.addEventListener("input", () => { this.play(false); this.held = true; show(+this.slider.value); });
+    this.tell(0);
   }
 
   play(on) {
@@ -300,7 +307,7 @@ class Player {
     Object.assign(this.slider, { min: first, max: last });
   }
 
-  tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2)} s`; }
+  tell(i) { this.slider.value = i; this.clock.textContent = `${(this.start_s + i * this.step_s).toFixed(2).replace("-", "−")} s`; }
 }
 
 const short = (value) => `${+value.toPrecision(3)}`.replace("-", "−");
@@ -324,10 +331,10 @@ function drawPicture(box, picture, place) {
   if (names.length) legend = own;
   bar.classList.toggle("shared", shared);
   Object.assign(picture, { place, hidden });
-  const entry = (label, colour, dashes, marker, filled = null) => {
+  const entry = (label, colour, dashes, marker, filled = null, width = 0) => {
     if (!label || seen.has(label)) return;
     seen.add(label);
-    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes, marker, filled), label);
+    const button = element("button", { type: "button", "aria-pressed": "true" }, swatchOf(colour, dashes, marker, filled, width), label);
     button.addEventListener("click", () => {
       const hide = !hidden.delete(label);
       if (hide) hidden.add(label);
@@ -339,7 +346,7 @@ function drawPicture(box, picture, place) {
   for (const panel of picture.panels) {
     if (panel.legend && !seen.has(panel.legend)) bar.append(element("span", { class: "scale" }, panel.legend));
     seen.add(panel.legend);
-    for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || []).map((length) => 2 * length), curve.dashes ? "" : curve.marker);
+    for (const curve of panel.curves) entry(curve.label, curve.colour.startsWith("run-") ? `var(--${curve.colour})` : inkOf(curve.colour, curve.shade), (curve.dashes || []).map((length) => 2 * length), curve.dashes ? "" : curve.marker, null, curve.width);
     for (const area of panel.areas) entry(area.label, inkOf(area.colour), [], "", area.alpha || null); // an area without a filling is its edge
     for (const [, label] of panel.limits) entry(label, "var(--failed)", [6, 4]);
   }
@@ -363,7 +370,7 @@ function drawPicture(box, picture, place) {
 
 // One button and one slider for all curves over time of a page, which stay in sight.
 function addPlayer(charts) {
-  const timed = charts.filter(({ panel }) => panel.x.startsWith("time"));
+  const timed = charts.filter(({ panel }) => panel.x.startsWith("time") && panel.curves.length <= MOST_TOLD);
   if (2 * timed.length < charts.length || !timed.length) return; // not what the page shows
   let start_s = Infinity, end_s = -Infinity;
   for (const time_s of timed.flatMap(({ panel }) => panel.curves.flatMap((curve) => curve.x))) if (time_s != null) { start_s = Math.min(start_s, time_s); end_s = Math.max(end_s, time_s); }

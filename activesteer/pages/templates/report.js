@@ -17,8 +17,7 @@
       this.toolbar(bar);
       if (data.track) this.track = new Track(this, data.track);
       for (const panel of data.panels) this.plots.push(this.panel(panel));
-      const zero = data.zero.map((title) => title[0].toLowerCase() + title.slice(1));
-      if (zero.length) this.box.after(element("p", { class: "key quiet" }, `Zero throughout, at rest: ${zero.join(", ")}.`));
+      if (data.zero.length) this.box.after(element("p", { class: "key quiet" }, zeroTold(data.zero)));
       new ResizeObserver(() => this.fit()).observe(this.box);
       this.zoom(null);
     }

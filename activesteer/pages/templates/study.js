@@ -1,7 +1,7 @@
 "use strict";
 // The page of a study: tables, and panels by `charts.js`, of the chosen manoeuvre and metric.
 const all = element("div"), chosenGroup = element("select"), chosenMetric = element("select");
-const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, MIXED = 0.25, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
+const SHOWN_RUNS = 600, FIELDS = 8, SHADES = 10, APART = 0.16, NAME_ROOM = 0.3, SPARSE = 24, FEW = 3, MIXED = 0.25, DARK_BELOW = 0.43; // black and white have the same contrast with this shade
 let body = all;
 const PANEL = { x: "", y: "", title: "", curves: [], areas: [], limits: [], names: [], notes: [], log: "", x_range: null, y_range: null, zero: false, equal: false, legend: null, above: null };
 const panelOf = (x, y, parts) => ({ ...PANEL, x, y, ...parts });
@@ -17,7 +17,10 @@ const constantIn = (low, high) => !(high - low > 1e-3 * Math.max(Math.abs(low), 
 function begin(title, ...texts) { body = all.appendChild(element("section", { class: "part" })); body.append(element("h2", {}, title), ...texts.filter(Boolean).map((text) => element("p", {}, text))); }
 
 function show(id, panels, scale = null) {
-  const box = body.appendChild(element("div", { class: "plots", "data-picture": id }));
+  // On a phone, many plots are folded, as on every page.
+  const folds = (panels.length >= MANY && id !== "all") || id === "parallel" ? element("details", { class: "rows narrow", ...(NARROW.matches ? {} : { open: "" }) }, element("summary", {}, `${panels.length} plots`)) : null;
+  if (folds) body.append(folds);
+  const box = (folds ?? body).appendChild(element("div", { class: "plots", "data-picture": id }));
   drawPicture(box, { panels, scale }, id);
 }
 
@@ -38,9 +41,11 @@ const placeOf = (factor, value) => (value == null || factor.numeric ? value : fa
 // The factors that vary in some rows; others belong to other manoeuvres.
 const varied = (rows) => DATA.factors.filter(({ key }) => rows.some((i) => DATA.rows.factors[key][i] != null));
 
-// Few points are large, so that they are seen. Points of controllers stand side by side where the levels of a factor would put them on one line. Few runs over one factor are joined.
+// Few points are large, so that they are seen. Points of controllers stand side by side where few values of a factor would put them on one line. Few runs over one factor are joined.
 function scatter(factor, label, rows, valueOf, joined = false) {
-  const beside = (c) => (factor.numeric ? 0 : APART * (c - (DATA.controllers.length - 1) / 2));
+  const driven = [...new Set(rows.map((i) => DATA.rows.factors[factor.key][i]).filter((value) => value != null))], [low, high] = endsOf(driven);
+  const step = !factor.numeric ? 1 : joined || driven.length > FEW ? 0 : (high - low) / FEW;
+  const beside = (c) => APART * step * (c - (DATA.controllers.length - 1) / 2);
   const curves = DATA.controllers.map((_, c) => {
     const own = rows.filter((i) => DATA.rows.controller[i] === c && valueOf(i) != null && DATA.rows.factors[factor.key][i] != null);
     if (joined) own.sort((i, k) => DATA.rows.factors[factor.key][i] - DATA.rows.factors[factor.key][k]);
@@ -149,12 +154,12 @@ function parallel(metric, rows) {
 
 // Numbers are aligned to the right, and a long table can be folded, as on every page.
 const NUMBER = /^[+−]?\d[\d.]*(e[+-]?\d+)?$|^-$/;
-function tableOf(header, lines, folded = lines.length > 15 && NARROW.matches) {
-  const sides = header.map((_, i) => (i && lines.every((line) => NUMBER.test(line[i])) ? "number" : ""));
+function tableOf(header, lines, folded = lines.length > 15 && NARROW.matches, told = "rows") {
+  const sides = header.map((_, i) => (lines.some((line) => line[i] instanceof Element) ? "controls" : i && lines.every((line) => NUMBER.test(line[i])) ? "number" : ""));
   const rows = lines.map((line) => element("tr", {}, ...line.map((cell, i) => element(i ? "td" : "th", { class: sides[i], "data-title": header[i] }, cell))));
   const head = element("tr", {}, ...header.map((text, i) => element("th", { class: sides[i] }, text)));
   const box = element("div", { class: "scrolling", tabindex: 0 }, element("table", { class: "findings cards" }, element("thead", {}, head), element("tbody", {}, ...rows)));
-  body.append(folded ? element("details", { class: "rows" }, element("summary", {}, `${lines.length} rows`), box) : box);
+  body.append(folded ? element("details", { class: "rows" }, element("summary", {}, `${lines.length} ${told}`), box) : box);
 }
 
 function replayLine(command) {
@@ -214,10 +219,10 @@ function drawGroup() {
   const place = new Map(rows.map((i) => [DATA.rows.run[i], i]));
   const driven = ({ key }, run) => { const value = DATA.rows.factors[key][place.get(run)]; return typeof value === "number" ? short(value) : String(value ?? "-"); };
   tableOf(["controller", "run", axisOf(metric), ...factors.map(axisOf), "command to drive and replay it"],
-    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), ...factors.map((factor) => driven(factor, run)), replayLine(command)])), true);
+    found.extremes.flatMap((part, c) => part.map(([run, value, command]) => [DATA.controllers[c], String(run), short(value), ...factors.map((factor) => driven(factor, run)), replayLine(command)])), true, "runs, with factors and commands");
   const constant = [], others = [];
   for (const other of DATA.metrics) {
-    if (!DATA.by_group[group][other.name]) continue;
+    if (other === metric || !DATA.by_group[group][other.name]) continue; // the chosen one is above
     const known = rows.map((i) => DATA.rows.metrics[other.name][i]).filter((value) => value != null);
     const claim = /^claim_(\w+)$/.exec(other.name);
     if (other.name === "claims_failed") continue; // the claims themselves follow
@@ -228,7 +233,8 @@ function drawGroup() {
       others.push({ ...panel, title: other.label, name: other.name });
     }
   }
-  begin("Every metric", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
+  if (!constant.length && !others.length) return;
+  begin("Other metrics", constant.length ? `The same in all runs, within 0.1 %: ${constant.join(", ")}.` : "");
   others.sort((a, b) => firstPlace(a.name) - firstPlace(b.name));
   show("first", others.splice(0, others.filter(({ name }) => DATA.first.includes(name)).length || 4));
   if (others.length) body = body.appendChild(element("details", { class: "rows" }, element("summary", {}, `${others.length} more metrics`)));

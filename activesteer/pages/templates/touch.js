@@ -1,5 +1,7 @@
 // A gap narrower than a pixel, where an angle jumps by a turn, would be drawn across.
 const wideGaps = (_plot, _series, _first, _last, gaps) => gaps.map(([from, to]) => [from - 2 * devicePixelRatio, to + 2 * devicePixelRatio]);
+// Titles of the plots that a standing car leaves out, in words.
+const zeroTold = (titles) => (titles.length ? `Zero throughout, at rest: ${titles.map((title) => title[0].toLowerCase() + title.slice(1)).join(", ")}.` : "");
 
 // One finger reads values, two zoom in time, a double tap shows all; up and down the page still scrolls.
 function touchable(u, zoom) {

@@ -371,7 +371,7 @@ def _mode_rows(modes: Sequence[Mode], highest_Hz: float) -> Iterator[tuple[str, 
         s = mode.eigenvalue_1ps
         value = f"{s.real:.2f}" + (f" +- {s.imag:.2f}i" if s.imag else "")
         largest = list(mode.participation.items())[:3]
-        parts = ", ".join(f"{part} {fraction:.0%}" for part, fraction in largest if fraction >= _LEAST_SHARE)
+        parts = ", ".join(f"{part} {100.0 * fraction:.0f} %" for part, fraction in largest if fraction >= _LEAST_SHARE)
         swings = (f"{mode.natural_frequency_Hz:.2f}", f"{mode.damping_ratio:.2f}") if s.imag else ("-", "-")
         yield mode.name, *swings, value, parts
 
@@ -421,6 +421,8 @@ DAMPING_RAYS: Final = (0.2, 0.4, 0.6, 0.8)
 
 _LONGEST_STEP_1PS: Final = 12.0
 """Longest distance of a pole from one speed to the next [1/s]."""
+_BEYOND: Final = 1.12
+"""Distance of the name of a ray from the origin, relative to the greatest distance of a pole."""
 _GREY: Final = "#cccccc"
 _GAIN_UNITS: Final = {
     "yaw_rate_radps": "1/s", "ay_mps2": "m/s² per rad", "roll_rad": "rad/rad", "sideslip_rad": "rad/rad",
@@ -439,7 +441,7 @@ def bode_picture(label: str, system: control.StateSpace) -> Picture:
         below = "frequency [Hz]" if output == "sideslip_rad" else ""
         short = quantity_of(output).short
         panels.append(Panel(below, f"{short} gain\n[{_GAIN_UNITS[output]}]", [gain], log="xy", x_range=BODE_RANGE_Hz))
-        panels.append(Panel(below, f"{short}:\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
+        panels.append(Panel(below, f"{short}\nphase [deg]", [phase], log="x", x_range=BODE_RANGE_Hz))
     return Picture(label, panels, columns=2, width_in=7.5, height_in=9.0)
 
 
@@ -453,8 +455,8 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         notes.append((0.0, radius, f"{frequency_Hz} Hz"))
     for damping in DAMPING_RAYS:
         x, y = -limit * damping, limit * math.sqrt(1.0 - damping**2)
-        curves.append(Curve([0.0, x], [0.0, y], "", _GREY, "-", 0.7))
-        notes.append((x, y, f"{damping:g}"))
+        curves.append(Curve([0.0, 1.05 * x], [0.0, 1.05 * y], "", _GREY, "-", 0.7))
+        notes.append((_BEYOND * x, _BEYOND * y, f"{damping:g}"))
     slowest, fastest = 3.6 * min(speeds_mps), 3.6 * max(speeds_mps)
     found = [[pole for pole in _named_poles(system) if abs(pole[1]) <= limit] for system in systems]
     branches = _branches(found)
@@ -470,7 +472,8 @@ def root_locus_picture(systems: Sequence[control.StateSpace], speeds_mps: Sequen
         curves,
         notes=notes,
         x_range=(-1.2 * limit, 0.1 * limit),
-        y_range=(-0.1 * limit, 1.05 * limit),
+        y_range=(-0.1 * limit, 1.15 * limit),
+        zero=True,
         equal=True,
     )
     scale = ("speed [km/h]", slowest, fastest)

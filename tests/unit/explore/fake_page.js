@@ -40,7 +40,7 @@ export class Scene { cars = new Map(); cones = []; setShape() {} setSurface() {}
 export const courses = { slalom: { title: "Slalom", goal: "", speed_kmh: 60, mu: 0.9 } };
 export class Drive { offer() {} going() {} failed() {} lost() {} draw() {} show() {} choose() {} }
 export const small = { matches: false, addEventListener() {} };
-export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, paint = () => "#333", slippery = () => "#333", mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
+export const dark = () => false, onTheme = () => {}, runColour = () => "#333", setTheme = () => {}, paint = () => "#333", undoScroll = () => {}, slippery = () => "#333", mostControllers = 4, colourCount = 6, systems = ["none", "ars", "afs"];
 export const element = (name, attributes = {}, ...children) => {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);

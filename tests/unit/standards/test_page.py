@@ -9,8 +9,8 @@ from dataclasses import replace
 from activesteer.pages import Table, render_page
 from activesteer.plotting import Curve, Panel, Picture
 from activesteer.standards.catalogue import Standard
-from activesteer.standards.examination import Examination, _together, examination_page
-from activesteer.standards.standard import Findings
+from activesteer.standards.examination import Examination, _side_by_side, _together, examination_page
+from activesteer.standards.standard import Findings, metrics_table
 
 EVIL = '</td><script>alert(1)</script><img src="http://example.org/x">{{ version }}'
 
@@ -51,10 +51,32 @@ def test_a_table_stands_above_the_plots_of_its_runs():
     tables = [Table(title, ["of"], [["1"]]) for title in ("Circle", "Limits")]
     pictures = [Picture(title, [line]) for title in ("Track", "Circle")]
     page = examination_page(replace(examination("word"), findings={"none": Findings({}, "", tables, pictures)}))
-    first, second, *_ = page.sections
-    assert [table.title for table in first.tables] == ["Limits"]
-    assert [picture.title for picture in first.pictures] == ["Track"]
-    assert (second.title, second.level, len(second.tables), len(second.pictures)) == ("Circle", 3, 1, 1)
+    parts = [
+        [section.level, *([part.title for part in each] for each in (section.tables, section.pictures))]
+        for section in page.sections[:4]
+    ]
+    assert parts == [[2, [], []], [3, ["Circle"], [""]], [3, ["Limits"], []], [3, [], ["Track"]]]
+
+
+def test_runs_that_fail_at_once_have_no_empty_plots():
+    nothing = Picture("Stop", [Panel("x", "y", [Curve([], [])]), Panel("x", "z")])
+    page = examination_page(replace(examination("word"), findings={"none": Findings({}, "", (), [nothing])}))
+    assert not any(section.pictures for section in page.sections)
+
+
+def test_metrics_of_several_controllers_stand_side_by_side_once():
+    def findings(**metrics: float) -> Findings:
+        table = metrics_table("Circle", {side: metrics for side in ("left", "right")})
+        return Findings({}, "one; two", [table, Table("Own", ["of"], [["1"]])])
+
+    found = {"none": findings(cones_hit=1.0), "ars": findings(cones_hit=2.0, lane_overstep_m=3.0)}
+    first, _, side_by_side, *others = examination_page(replace(examination("word"), findings=found)).sections
+    assert [row[2] for row in first.tables[0].rows] == ["one<br>two"] * 2
+    (table,) = side_by_side.tables
+    assert list(table.columns) == ["", "unit", "none, left", "none, right", "ars, left", "ars, right"]
+    assert [[cell[:1] for cell in row[2:]] for row in table.rows] == [["1", "1", "2", "2"], ["-", "-", "3", "3"]]
+    assert [section.tables[0].title for section in others if section.tables] == ["Own", "Own"]
+    assert _side_by_side({str(number): findings(cones_hit=1.0) for number in range(5)}) == {}  # ten columns
 
 
 def test_overlaid_controllers_share_their_pictures_and_sides_differ_in_width():
@@ -85,6 +107,6 @@ def test_a_picture_whose_curves_could_not_be_told_apart_stays_with_its_controlle
     assert [curve.label for curve in panel.curves] == ["none", "ars"]
     example = examination("word")
     page = examination_page(replace(example, findings=found))
-    assert [[picture.title for picture in section.pictures] for section in page.sections[:4]] == [
-        [], ["One"], ["Many", "Cones"], ["Many", "Cones"]
+    assert [[picture.title for picture in section.pictures] for section in page.sections if section.pictures] == [
+        ["One"], *[["Many"], ["Cones"]] * 2
     ]  # fmt: skip

@@ -12,9 +12,16 @@ from markupsafe import Markup
 from activesteer.analysis.figures import figure_2
 from activesteer.errors import ParameterError
 from activesteer.pages import render_page
-from activesteer.plotting import Panel, draw
+from activesteer.plotting import Panel, Picture, draw
 from activesteer.studies.linear.driver_loop import conclusion
-from activesteer.studies.linear.linearisation import bode_picture, linear_car, modes_page, root_locus_picture
+from activesteer.studies.linear.linearisation import (
+    DAMPING_RAYS,
+    LOCUS_LIMIT_Hz,
+    bode_picture,
+    linear_car,
+    modes_page,
+    root_locus_picture,
+)
 from activesteer.vehicle.linear_state import Mode
 from tests.unit.analysis.synthetic import step_steer
 
@@ -66,6 +73,16 @@ def test_root_locus_has_the_poles_of_every_speed():
     assert (low, high) == pytest.approx((36.0, 144.0))
 
 
+def test_names_of_rays_stand_beyond_every_pole_that_is_drawn():
+    (panel,), limit_1ps = root_locus_picture([system()], [20.0]).panels, 2.0 * math.pi * LOCUS_LIMIT_Hz
+    assert isinstance(panel, Panel)
+    rays = [(x, y) for x, y, text in panel.notes if text in {f"{ray:g}" for ray in DAMPING_RAYS}]
+    assert len(rays) == len(DAMPING_RAYS)
+    # A name hangs below its point, by up to 7 % of the limit on a phone.
+    assert all(math.hypot(x, y - 0.07 * limit_1ps) > limit_1ps for x, y in rays)
+    assert max(y for _, y in rays) < draw(Picture("", [panel])).get_axes()[0].get_ylim()[1]
+
+
 def test_poles_are_joined_to_the_nearest_ones_of_the_next_speed():
     speeds = [20.0, 25.0, 40.0]
     panel = root_locus_picture([system(speed) for speed in speeds], speeds).panels[0]
@@ -84,7 +101,7 @@ def test_page_has_a_row_for_each_mode_and_all_panels():
     pictures = bode_picture("a", system()), root_locus_picture([system()], [20.0])
     page = modes_page("car", modes, *pictures)
     assert page.sections[-1].tables[0].rows == [
-        ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99%"]
+        ["yaw/sideslip", "0.80", "0.60", "-3.00 \N{PLUS-MINUS SIGN} 4.00i", "yaw 99 %"]
     ]
     assert render_page(page).count('class="plots"') == 2
     verdict, least, _ = page.lead
