@@ -92,7 +92,8 @@ def test_the_gauges_of_a_car_that_spins_are_those_of_its_recording(tmp_path: Pat
 
 
 @pytest.mark.parametrize(("controller", "low_deg", "high_deg"), [
-    ("none", 30.0, math.inf), ("lqr", 0.0, 15.0), ("esc", 0.0, 15.0), ("integrated", 0.0, 15.0),
+    ("none", 30.0, math.inf), pytest.param("lqr", 0.0, 15.0, marks=pytest.mark.slow),
+    pytest.param("esc", 0.0, 15.0, marks=pytest.mark.slow), ("integrated", 0.0, 15.0),
 ])  # fmt: skip
 def test_a_key_to_the_left_and_then_to_the_right_on_snow_spins_only_the_car_without_control(
     controller: str, low_deg: float, high_deg: float, tmp_path: Path
