@@ -155,6 +155,8 @@ def test_every_suspension_stands_and_has_one_way_to_travel(
     result = kinematics_compliance(made.vehicle_file)
     assert result["car", "left_right_difference"] < 1e-6
     assert result["rear", "ride_frequency"] == pytest.approx(1.35, rel=2e-3)
+    assert result["front", "ride_frequency"] == pytest.approx(1.2, abs=0.003)
+    assert result["front", "steering_ratio"] == pytest.approx(15.5, abs=0.02)
     assert result["front", "damper_ratio"] == pytest.approx(0.518, abs=0.003)
     model = result.measured.vehicle.model
     for corner in CORNERS:
