@@ -36,14 +36,14 @@ def lane_overstep(recording: RecordingLike, course: Course, car: Footprint) -> f
     return max(float(np.nanmax(oversteps)), -float(_distances(recording, ends, car).min()))
 
 
-def stays_in_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
-    """Return whether the whole body passes all lanes within their sides."""
+def passes_lanes(recording: RecordingLike, course: Course, car: Footprint) -> bool:
+    """Return whether the whole body passes the ends of all lanes."""
     # A car that turns round before the last lane crosses no side there, but it does not keep to the lanes.
-    for x, _ in corners(recording, car):
-        for lane in course.lanes:
-            if not ((x >= lane.start_x_m) & (x <= lane.end_x_m)).any() or not (x > lane.end_x_m).any():
-                return False
-    return lane_overstep(recording, course, car) <= 0.0
+    return all(
+        ((x >= lane.start_x_m) & (x <= lane.end_x_m)).any() and (x > lane.end_x_m).any()
+        for x, _ in corners(recording, car)
+        for lane in course.lanes
+    )
 
 
 def cone_distances(recording: RecordingLike, course: Course, car: Footprint) -> Array:

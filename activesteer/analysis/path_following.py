@@ -135,8 +135,8 @@ def _places(recording: RecordingLike, course: Course) -> dict[str, float]:
     values["heading_end_rad"] = lanes.heading_at_end(recording, course.path.x_m, course.path.y_m)
     if course.lanes:
         car = read_footprint(recording)
-        values["lane_overstep_m"] = lanes.lane_overstep(recording, course, car)
-        values["stays_in_lanes"] = float(lanes.stays_in_lanes(recording, course, car))
+        values["lane_overstep_m"] = overstep_m = lanes.lane_overstep(recording, course, car)
+        values["stays_in_lanes"] = float(overstep_m <= 0.0 and lanes.passes_lanes(recording, course, car))
     if len(course.cones_m):
         distances = lanes.cone_distances(recording, course, read_footprint(recording))
         values["cones_hit"] = float(np.count_nonzero(distances <= 0.0))

@@ -39,7 +39,7 @@ from activesteer.resources import DEFAULT_DRIVER
 from activesteer.road.course import Footprint
 from activesteer.road.drawn import surface_in
 from activesteer.road.road import road_of
-from activesteer.scenario import Scenario, resolve, value_of
+from activesteer.scenario import Scenario, holders_of, resolve, value_of
 from activesteer.simulation.preparation import searched_angle, with_amplitude_found
 from activesteer.simulation.simulation import Simulation
 from activesteer.vehicle import Vehicle
@@ -108,9 +108,11 @@ def sliders(scenario: Scenario, controllers: Sequence[str], own: Mapping[str, Pa
 
 def _of(group: str, scenario: Scenario, ranges: Mapping[str, tuple[float, float, float]]) -> Iterator[Slider]:
     for key, (least, high, step) in ranges.items():
+        if not holders_of(key, type(scenario.maneuver)):
+            continue  # the error of `value_of` would look for similar names, which takes 50 ms
         searches = key == "speed_kmh" and scenario.maneuver.search is not None
         low = max(least, round(3.6 * MIN_SEARCH_SPEED_MPS, 6)) if searches else least
-        with suppress(ParameterError):  # not every manoeuvre has every key
+        with suppress(ParameterError):  # a key may have no value
             value = value_of(scenario, key)
             # A manoeuvre that begins at rest has its speeds in its phases.
             if _moves(scenario, key, value) and not (key == "speed_kmh" and value == 0.0):

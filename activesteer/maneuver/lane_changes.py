@@ -30,7 +30,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal, NamedTuple
 
@@ -322,7 +322,8 @@ def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
     return x, y
 
 
-def _least_jerk_path(course: Sequence[Lane], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
+@lru_cache(maxsize=64)  # runs of a study mostly have the same lanes
+def _least_jerk_path(course: tuple[Lane, ...], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Return a straight line to the first lane, then the path of least jerk to the middle of the last lane's end."""
     start, end = course[0].start_x_m, course[-1].end_x_m
     end_y = 0.5 * (course[-1].right_y_m + course[-1].left_y_m)

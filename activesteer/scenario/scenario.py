@@ -233,7 +233,7 @@ def part_of(
         return "controllers", [*own]
     if first in _PARTS and rest:
         return first, rest
-    holders = _holders(key, kind)
+    holders = holders_of(key, kind)
     if len(holders) == 1:
         return holders[0], [first, *rest]
     if holders:
@@ -255,7 +255,7 @@ def part_of(
 
 
 @functools.lru_cache(1024)
-def _holders(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
+def holders_of(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
     """Return the parts of a scenario (`maneuver`, `vehicle`) in which a key exists."""
     dotted, of_part = key + ".", {"maneuver": key_paths(kind), "vehicle": key_paths(VehicleConfig)}
     return tuple(

@@ -153,7 +153,7 @@ class ClosedLoop(Uncopyable):
         self.join(self._record, 0, SharedTables())
         self._connect()
         steps = round(maneuver.settle_s / timestep_s)
-        measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s)
+        measurement = vehicle.start(maneuver.speed_mps, -steps * timestep_s, placed=True)
         drive: Any = self.driver_setup.drive  # the vehicle's own
         first = {
             "bindings": vehicle.address, "drive_fractions": drive.fractions, "drive_numbers": drive.numbers,

@@ -166,19 +166,21 @@ class Vehicle(Uncopyable):
         for play, value in zip(plays, originals, strict=True):
             play[:] = value
 
-    def start(self, speed_mps: float, time_s: float = 0.0) -> Measurement:
+    def start(self, speed_mps: float, time_s: float = 0.0, *, placed: bool = False) -> Measurement:
         """Start the car from static ride, rolling straight ahead at a speed.
 
         Args:
             speed_mps: Speed along world x [m/s].
             time_s: Time at which the car starts; negative before a recording [s].
+            placed: The car is still in the static equilibrium in which it was built.
 
         Returns:
             The first measurement.
         """
         data = self.data
-        self._forces["areas_felt"] = 0.0
-        self._place()
+        if not placed:
+            self._forces["areas_felt"] = 0.0
+            self._place()
         data.qvel[0] = speed_mps
         # The settling before a manoeuvre corrects the rest.
         data.qvel[self.wheels.spins] = speed_mps / self.wheels.heights_m()

@@ -16,21 +16,16 @@ from scipy.spatial.transform import Rotation
 
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.resources import models_dir
-from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.rigs.kc.held_car import MOUNT_ENDINGS, Case, HeldCar
 from activesteer.scenario import load_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder.corner_motion import corner_motion
+from tests.bench import on_the_bench
 from tests.physics.rigid_links import FRONT_LINKS, REAR_LINKS, Pose, RigidCorner
 from tests.physics.static_corner import PINION_M, StaticCorner
 
 TRAVEL_M = np.linspace(-0.08, 0.08, 17)
 STIFFER = 100.0
-
-
-@functools.cache
-def compact() -> KcResult:
-    return kinematics_compliance("compact")
 
 
 def vehicle() -> Vehicle:
@@ -110,8 +105,8 @@ def test_the_rigid_solution_is_sensitive_to_what_it_checks() -> None:
 
 
 def test_a_car_with_a_hinge_has_no_screw_to_sweep() -> None:
-    assert compact().curves
-    assert "rear_steering_bump" not in compact().curves
+    assert on_the_bench().curves
+    assert "rear_steering_bump" not in on_the_bench().curves
 
 
 @pytest.mark.parametrize("corner", ["fl", "rl"])
@@ -172,14 +167,14 @@ def hardpoint(model: mujoco.MjModel, name: str) -> Array:
 @pytest.mark.parametrize(("axle", "corner"), [("front", "fl"), ("rear", "rl")])
 def test_side_force_compliance_is_that_of_the_links_stiffness_matrix(axle: str, corner: str) -> None:
     motion, toe, camber = StaticCorner(HeldCar(vehicle()), corner).under_side_force()
-    result = compact()
+    result = on_the_bench()
     assert result[axle, "lateral_compliance_centre"] == pytest.approx(motion, rel=0.02)
     assert result[axle, "side_force_toe"] == pytest.approx(toe, rel=0.02)
     assert result[axle, "side_force_camber"] == pytest.approx(camber, rel=0.02)
 
 
 def test_left_and_right_mirror_each_other() -> None:
-    result = compact()
+    result = on_the_bench()
     assert result["car", "left_right_difference"] == pytest.approx(0.0, abs=1e-6)
     for name in ("parallel_travel", "lateral_opposed", "longitudinal_patch", "aligning_opposed"):
         sweep = result.curves[name]
@@ -228,12 +223,12 @@ def test_a_higher_tie_rod_end_at_the_rack_turns_the_wheel_in_in_bump(tmp_path: P
     """Behind the axle, a rod that slopes down outwards pushes the wheel's rear edge out in bump."""
     toe, _ = bump_slopes(moved_hardpoint(tmp_path, "steering.xml", "tie_rod_inner", 2, 0.03))
     assert toe[0] > 5.0
-    assert compact()["front", "bump_steer"] < 0.0
+    assert on_the_bench()["front", "bump_steer"] < 0.0
 
 
 def test_an_upper_link_that_falls_inwards_gains_camber(tmp_path: Path) -> None:
     """The outer end of an upper link that rises outwards moves inwards in bump, together with the wheel's top."""
-    design = compact()["rear", "bump_camber"]
+    design = on_the_bench()["rear", "bump_camber"]
     lower = moved_hardpoint(tmp_path, "rear_axle.xml", "camber_link_inner", 2, -0.05)
     assert bump_slopes(lower)[1][1] < design - 3.0
     higher = moved_hardpoint(tmp_path, "rear_axle.xml", "camber_link_inner", 2, 0.10)
@@ -241,7 +236,7 @@ def test_an_upper_link_that_falls_inwards_gains_camber(tmp_path: Path) -> None:
 
 
 def test_forces_turn_wheels_the_way_they_push() -> None:
-    result = compact()
+    result = on_the_bench()
     for axle in ("front", "rear"):
         assert result[axle, "aligning_steer"] > 0.0
         assert result[axle, "lateral_compliance_patch"] > 0.0
@@ -257,13 +252,13 @@ def test_side_force_goes_to_the_body_at_the_roll_centre() -> None:
 
     In parallel travel, the load of spring and bar on the elastic top mount is another, and the path differs by 2 mm.
     """
-    sweep = compact().curves["opposite_travel"]
+    sweep = on_the_bench().curves["opposite_travel"]
     near = np.abs(sweep.x) < 0.0151
     for axle, wheel in (("front", 0), ("rear", 2)):
         path = sweep.contact_m[near, wheel]
         by_path = 1e3 * np.polyfit(path[:, 2], path[:, 1], 1)[0] * sweep.contact_m[sweep.zero, wheel, 1]
-        assert compact()[axle, "roll_centre_height_by_force"] == pytest.approx(by_path, abs=0.5)
-        assert compact()[axle, "roll_centre_height"] == pytest.approx(by_path, abs=3.0)
+        assert on_the_bench()[axle, "roll_centre_height_by_force"] == pytest.approx(by_path, abs=0.5)
+        assert on_the_bench()[axle, "roll_centre_height"] == pytest.approx(by_path, abs=3.0)
 
 
 def support(corner: str) -> float:
@@ -290,7 +285,7 @@ def test_longitudinal_force_lifts_by_the_slope_of_the_patchs_path(corner: str) -
 
 
 def test_anti_dive_and_anti_lift_are_those_of_rigid_links() -> None:
-    result = compact()
+    result = on_the_bench()
     brakes = result.measured.parameters.brakes
     share = brakes.front_torque_Nm / (brakes.front_torque_Nm + brakes.rear_torque_Nm)
     lever = result["car", "wheelbase"] / result["car", "cg_height"]
@@ -304,7 +299,7 @@ def test_roll_stiffness_is_that_of_springs_and_bar(axle: str) -> None:
 
     At a strut it acts on the travel of the tube, that is of damper and top mount: rigid links give it.
     """
-    result = compact()
+    result = on_the_bench()
     model = result.measured.vehicle.model
     bar = float(model.tendon_stiffness[model.tendon(f"{axle}_anti_roll_bar").id])
     ratio = corner_motion(model, "fl")[0]["fl_damper"] if axle == "front" else 1.0
@@ -315,7 +310,7 @@ def test_roll_stiffness_is_that_of_springs_and_bar(axle: str) -> None:
 
 def test_steering_ratio_and_rack_belong_to_the_pinion() -> None:
     """Rack per turn is the pinion's circumference minus column deflection; ratio x steer is the wheel angle."""
-    result = compact()
+    result = on_the_bench()
     assert result["front", "rack_travel"] == pytest.approx(2e3 * math.pi * PINION_M, rel=0.01)
     sweep = result.curves["steering_rolling"]
     right, left = np.interp([-0.1, 0.1], sweep.x, sweep.steer_rad[:, :2].mean(axis=1))
@@ -325,18 +320,18 @@ def test_steering_ratio_and_rack_belong_to_the_pinion() -> None:
 
 def test_at_rest_the_wheels_lag_behind_the_steering_wheel() -> None:
     rolling, left, right = (
-        compact().curves[name].steer_rad[:, :2].mean(axis=1)
+        on_the_bench().curves[name].steer_rad[:, :2].mean(axis=1)
         for name in ("steering_rolling", "steering_at_rest_left", "steering_at_rest_right")
     )
     assert (left < rolling).all()
     assert (rolling < right).all()
-    assert compact()["front", "parking_lost_angle"] > 5.0
+    assert on_the_bench()["front", "parking_lost_angle"] > 5.0
 
 
 def test_steering_axes_are_those_of_the_hardpoints() -> None:
     """At the front the line through ball joint and top mount, at the rear the hinge."""
     car = vehicle()
-    result = compact()
+    result = on_the_bench()
     ball, top = hardpoint(car.model, "fl_lca_front_outer"), hardpoint(car.model, "fl_spring_inner")
     along = top - ball
     # The standing car is pitched by 0.005 deg against its design position.
@@ -353,12 +348,12 @@ def test_steering_axes_are_those_of_the_hardpoints() -> None:
 
 def test_bounce_and_pitch_are_those_of_the_plane_model_on_ride_rates() -> None:
     """Expected are the two frequencies of a rigid body on two springs, without the linearisation."""
-    result = compact()
+    result = on_the_bench()
     rates = np.array([2e3 * result[axle, "ride_rate"] for axle in ("front", "rear")])
     arms = np.array([1.0, -1.0]) * result["car", "wheelbase"] * 1e-3
     share = result["car", "front_load_fraction"] / 100.0
     arms *= [1.0 - share, share]
-    model = compact().measured.vehicle.model
+    model = on_the_bench().measured.vehicle.model
     unsprung = sum(float(model.body_subtreemass[model.body(f"{corner}_knuckle").id]) for corner in CORNERS)
     mass = result["car", "mass"] - unsprung
     inertia = float(model.body_inertia[model.body("chassis").id, 1])
@@ -376,7 +371,7 @@ def test_roll_gradient_is_that_of_springs_and_roll_centres() -> None:
     with the part that the weight adds as the car leans (Gillespie 1992, ch. 6). Left out: the unsprung masses, which
     load the springs a little because their wheels camber.
     """
-    result = compact()
+    result = on_the_bench()
     model = result.measured.vehicle.model
     chassis = model.body("chassis").id
     share = result["car", "front_load_fraction"] / 100.0
@@ -393,7 +388,7 @@ def test_roll_gradient_is_that_of_springs_and_roll_centres() -> None:
 
 def test_braking_pitch_is_that_of_load_transfer_and_anti_features() -> None:
     """Load transfer m a h / l: fully on the tyres; on the springs without the part of the links (Gillespie, ch. 7)."""
-    result = compact()
+    result = on_the_bench()
     transfer_N = result["car", "mass"] * GRAVITY_MPS2 * result["car", "cg_height"] / result["car", "wheelbase"]
     moved_m = 0.0
     for axle, anti, tyre in zip(("front", "rear"), ("anti_dive", "anti_lift"), result.measured.tyres, strict=True):
@@ -405,7 +400,7 @@ def test_braking_pitch_is_that_of_load_transfer_and_anti_features() -> None:
 
 def test_roll_understeer_follows_from_the_toe_of_both_wheels() -> None:
     """Toe-out in bump at the front and toe-in in bump at the rear both cause understeer."""
-    result = compact()
+    result = on_the_bench()
     assert result["front", "roll_steer_outer"] < 0.0 < result["front", "roll_understeer"]
     assert result["rear", "roll_steer_outer"] > 0.0
     assert result["rear", "roll_understeer"] > 0.0
@@ -425,7 +420,7 @@ def test_a_side_force_behind_the_contact_point_is_a_force_and_a_moment(axle: str
         held.equilibrium(case)
         axis = held.wheel(first).rotation[:, 1]
         toe.append(math.degrees(math.atan2(axis[0], axis[1])))
-    assert compact()[axle, "side_force_toe_with_trail"] == pytest.approx(toe[0] - toe[1], abs=0.005)
+    assert on_the_bench()[axle, "side_force_toe_with_trail"] == pytest.approx(toe[0] - toe[1], abs=0.005)
 
 
 def test_the_contact_point_is_the_lowest_of_the_wheel() -> None:

@@ -11,6 +11,7 @@ new array of the native step cannot be forgotten.
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
@@ -26,6 +27,7 @@ PROCESSOR: Final = "x86-64-v3"
 """Processor for which code is compiled: x86-64 with AVX2 and FMA (Haswell, 2013; Zen, 2017)."""
 
 
+@functools.cache
 def car_code() -> dict[str, bytes]:
     """Return the object files of the functions in `entry` and of the callbacks `passive`, `act_dyn`, `sensor`."""
     # Compiles for half a minute at first use.

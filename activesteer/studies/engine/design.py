@@ -10,7 +10,6 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from activesteer.config import Range, Source, parse_value
 from activesteer.core.files import read_csv
@@ -84,6 +83,8 @@ def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: in
 
 def _unit_sample(kind: str, dimensions: int, count: int, seed: list[int]) -> NDArray[np.float64]:
     """Return points of the unit cube, shape (points, dimensions)."""
+    from scipy.stats import qmc  # noqa: PLC0415 - slow to import, and workers draw nothing
+
     rng = np.random.default_rng(seed)
     if kind == "random":
         return rng.random((count, dimensions))

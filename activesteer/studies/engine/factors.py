@@ -8,7 +8,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from activesteer.config import Source, build
 from activesteer.core.limits import MAX_NUMBER
@@ -97,6 +96,8 @@ class Factor(FactorTable):
             places = np.minimum(np.searchsorted(ends, unit, side="right"), len(self.values) - 1)
             return [self.values[place] for place in places]
         if self.kind == "normal":
+            from scipy.special import ndtr, ndtri  # noqa: PLC0415 - slow to import, and few studies need it
+
             mean, deviation = self.normal
             below, above = ndtr((np.array(self.truncate) - mean) / deviation)
             found = mean + deviation * ndtri(below + unit * (above - below))
@@ -149,6 +150,8 @@ def _checked_ends(factor: Factor, source: Source) -> tuple[float, ...]:
     where = ("factors", factor.key, kind)
     first, second = _pair(getattr(factor, kind), source, where)
     if kind == "normal":
+        from scipy.special import ndtr  # noqa: PLC0415 - slow to import, and few studies need it
+
         if second <= 0.0:
             raise source.fail(where, f"the standard deviation is {second:g}; it must be above 0")
         around = (first - _DEFAULT_TRUNCATION * second, first + _DEFAULT_TRUNCATION * second)

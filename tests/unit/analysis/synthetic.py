@@ -199,6 +199,7 @@ def along_path(
     rear_rad: float = 0.0,
     superposition_rad: float = 0.0,
     duration_s: float = 12.0,
+    timestep_s: float = 0.002,
 ) -> SyntheticRun:
     """A run at `SPEED_MPS` whose front axle centre follows a track; yaw rate and sideslip are sines of their own.
 
@@ -219,13 +220,15 @@ def along_path(
         rear_rad: Amplitude of the rear angle demanded.
         superposition_rad: Amplitude of the superposed angle demanded.
         duration_s: Length of the run.
+        timestep_s: Interval of the samples.
     """
-    time_s = np.arange(round(duration_s * 1000.0)) * 0.001
+    time_s = np.arange(round(duration_s / timestep_s)) * timestep_s
     x = SPEED_MPS * time_s
     if stops_m is not None:
         x = np.minimum(x, stops_m)
     y = track(x)
-    heading = np.arctan2(np.gradient(track(np.append(x, x[-1] + 0.02)))[:-1], 0.02)
+    step_m = SPEED_MPS * timestep_s
+    heading = np.arctan2(np.gradient(track(np.append(x, x[-1] + step_m)))[:-1], step_m)
     gain = np.where(x >= (last_gate_m or np.inf), after, 1.0)
     sine = np.sin(2.0 * np.pi * time_s)
     channels = {

@@ -228,7 +228,7 @@ def test_who_keeps_a_lane_by_less_than_can_be_measured_has_not_kept_it(number, s
     arguments[system]["track"] = wider(1.06)  # 1 cm inside
     for share, outside_m, holds in ((1.07, 0.03, False), (1.08, 0.07, True)):
         arguments["none"]["track"] = wider(share)
-        claim = check("double_lane_change_low_mu", arguments)[number]
+        claim = check("double_lane_change_low_mu", arguments, timestep_s=0.001)[number]
         assert claim.values["none_lane_overstep_m"] == pytest.approx(outside_m, abs=0.005)
         assert claim.passed is holds
 

@@ -13,9 +13,9 @@ from activesteer.analysis.lanes import (
     lane_overstep,
     largest_difference,
     path_distance,
-    stays_in_lanes,
     track_over_x,
 )
+from activesteer.analysis.path_following import path_following_metrics
 from activesteer.analysis.source import read_course, read_footprint
 from activesteer.road.course import CONE_RADIUS_M, FRONT_OVERHANG_M, REAR_OVERHANG_M
 from tests.unit.analysis.synthetic import LANES, WHEELBASE_M, WIDTH_M, SyntheticRun, along_path, offset_track
@@ -33,7 +33,7 @@ def overstep(run: SyntheticRun) -> float:
 
 
 def kept(run: SyntheticRun) -> bool:
-    return stays_in_lanes(run, read_course(run), read_footprint(run))
+    return path_following_metrics(run)["stays_in_lanes"] == 1.0
 
 
 def distances(run: SyntheticRun) -> np.ndarray:
@@ -168,7 +168,7 @@ def test_a_car_that_does_not_get_there_has_no_difference():
 
 
 def test_a_car_that_turns_back_counts_where_it_was_first():
-    run = along_path(np.zeros_like, duration_s=4.0)
+    run = along_path(np.zeros_like, duration_s=4.0, timestep_s=0.001)
     x = run["front_axle_x_m"]
     run.channels["front_axle_y_m"] = np.where(run.time_s < 2.0, 0.0, 3.0)
     run.channels["front_axle_x_m"] = np.where(run.time_s < 2.0, x, 2.0 * x[2000] - x)

@@ -15,9 +15,9 @@ from activesteer.core.signals import Measurement
 from activesteer.errors import ControllerError
 from activesteer.estimation import EstimatorParameters
 from activesteer.estimation.records import FRICTION
-from activesteer.rigs.kc import kinematics_compliance
 from activesteer.scenario import resolve
 from activesteer.tyre.evaluation import MagicFormula
+from tests.bench import on_the_bench
 from tests.raising import raises
 from tests.unit.controllers.cars import setup
 from tests.unit.estimation.drives import drive, estimates, rolling
@@ -158,7 +158,7 @@ def test_soft_tyres_are_told_from_a_slippery_road_and_front_from_rear(mu, front,
         assert run[f"estimated_{name}_stiffness_std"][late].max() < 0.1
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_for_soft_tyres(vehicle):
     """At the assumed friction of dry asphalt the slope of the forces over the friction is 0 at these slip angles."""
     run = drive(
@@ -172,7 +172,7 @@ def test_packed_snow_is_found_as_soon_as_the_tyres_slide_on_it_and_is_not_taken_
     assert run["estimated_front_stiffness"][later].min() > 0.6
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan"])
+@pytest.mark.parametrize("vehicle", ["compact", pytest.param("sedan", marks=pytest.mark.slow)])
 def test_a_friction_that_jumps_is_not_taken_for_soft_tyres(vehicle):
     """From dry road to snow and back within a second. Before, the error reached 0.57 and stayed behind the snow."""
     run = drive("mu_jump", vehicle).recording
@@ -214,7 +214,7 @@ def test_the_edge_of_snow_is_not_taken_for_an_offset_of_the_accelerometer():
     assert (error < 2.0 * run["estimated_friction_std"][behind]).mean() > 0.9
 
 
-@pytest.mark.parametrize("vehicle", ["sedan", "compact"])
+@pytest.mark.parametrize("vehicle", ["sedan", pytest.param("compact", marks=pytest.mark.slow)])
 def test_the_model_has_the_slip_angles_of_a_rolling_car(vehicle):
     """With the true motion. The sedan's tyres feel the slip of their wheel centres: the error was 0.21 deg."""
     run = simulate("slalom", "none", vehicle)
@@ -251,7 +251,7 @@ def test_a_filter_that_is_sure_of_ice_finds_itself_wrong_in_a_gentle_turn(make):
     assert np.abs(later["sideslip_rad"] - run.recording["sideslip_rad"][-500:])[150:].max() < math.radians(0.2)
 
 
-@pytest.mark.parametrize(("vehicle", "mu"), [("compact", 0.4), ("sedan", 0.6)])
+@pytest.mark.parametrize(("vehicle", "mu"), [pytest.param("compact", 0.4, marks=pytest.mark.slow), ("sedan", 0.6)])
 def test_wheels_that_the_anti_lock_system_lets_slide_show_the_friction(vehicle, mu):
     turn = {"road.mu": mu, "turn.lateral_acceleration_mps2": 2.0, "brake.pedal": 0.9, "duration_s": 8.0}
     run = drive("brake_in_turn", vehicle, **turn).recording
@@ -292,7 +292,7 @@ def test_the_superelevation_of_a_curve_is_not_taken_for_a_slippery_road(vehicle,
     assert (np.abs(run["estimated_friction"] - 0.9) < 2.0 * run["estimated_friction_std"]).mean() > 0.9
 
 
-@pytest.mark.parametrize("vehicle", ["compact", "sedan", "tesla_model_s"])
+@pytest.mark.parametrize("vehicle", ["compact", "sedan", pytest.param("tesla_model_s", marks=pytest.mark.slow)])
 def test_the_toe_of_dived_wheels_on_split_friction_is_not_taken_for_an_offset_of_the_sensors(vehicle):
     """Dive turns the wheels by up to 1.5 deg per g, and only those on the better side count."""
     run = drive("split_mu_braking", vehicle).recording
@@ -323,7 +323,7 @@ def test_roll_steer_is_not_taken_for_stiff_tyres():
 )
 def test_roll_steer_in_vehicle_files_is_that_of_the_test_bench(vehicle):
     car = resolve("straight_line", vehicle).car
-    body, bench = car.config.single_track, kinematics_compliance(vehicle)
+    body, bench = car.config.single_track, on_the_bench(vehicle)
     per_metre = 0.5 * body.mass_kg * GRAVITY_MPS2 / body.wheelbase_m
     loads_N = per_metre * body.cg_to_rear_m, per_metre * body.cg_to_front_m
     parameters = resolve("straight_line", vehicle).controller_setup(0.001).gains.estimator

@@ -55,7 +55,7 @@ def test_a_run_has_the_times_on_a_slippery_patch(tmp_path: Path) -> None:
     runs = Runs(Folder(tmp_path))
     (jump, _) = runs.run(RunRequest(maneuver="mu_jump"), lambda: False)
     ((begin_s, end_s),) = jump.header["patches_s"]
-    recording = activesteer.simulate("mu_jump", "none")
+    (recording,) = runs.driven().values()
     on = recording.time_s[recording["fr_mu"] < 0.5]
     assert begin_s == pytest.approx(on[0], abs=1e-3)
     assert end_s > on[-1]  # the rear wheels leave it later
@@ -81,7 +81,7 @@ def test_a_car_that_does_not_follow_a_step_has_no_response_times_and_a_remark(tm
     ("maneuver", "key", "values"),
     [
         ("sine_with_dwell", "steer.steering_wheel_deg", {"road.mu": 0.35, "steer.amplitude_factor": 4.0}),
-        ("step_steer", "steer.steering_wheel_deg", {"road.mu": 0.2}),
+        pytest.param("step_steer", "steer.steering_wheel_deg", {"road.mu": 0.2}, marks=pytest.mark.slow),
         ("fishhook", "reference_angle_deg", {"road.mu": 0.3}),
         ("brake_in_turn", "turn.steering_wheel_deg", {"road.mu": 0.3}),
     ],
@@ -210,11 +210,11 @@ def test_a_newer_choice_drops_the_rest_of_the_runs(tmp_path: Path) -> None:
 def test_the_road_under_the_cars_is_the_one_that_they_drive_on(tmp_path: Path) -> None:
     """The kerb of 60 mm, sent once: not with the second run, nor while a slider moves, nor for a plane road."""
 
-    def driven(dragging: bool, maneuver: str = "kerb_strike") -> list[Reply]:
-        choice = RunRequest(maneuver=maneuver, controllers=("none", "ars"), dragging=dragging)
+    def driven(*controllers: str, dragging: bool = False, maneuver: str = "kerb_strike") -> list[Reply]:
+        choice = RunRequest(maneuver=maneuver, controllers=controllers, dragging=dragging)
         return [reply for reply in Runs(Folder(tmp_path)).run(choice, lambda: False) if reply.header["kind"] == "run"]
 
-    first, second = driven(dragging=False)
+    first, second = driven("none", "ars")
     _, corners_m, factors, triangles = first.arrays
     assert corners_m[:, 2].min() == 0.0
     assert corners_m[:, 2].max() == pytest.approx(0.06)
@@ -225,8 +225,8 @@ def test_the_road_under_the_cars_is_the_one_that_they_drive_on(tmp_path: Path) -
     assert triangles.max() == len(corners_m) - 1
     assert "ground_m" not in second.header
     assert len(second.arrays) == 1
-    assert "ground_m" not in driven(dragging=True)[0].header
-    plane = driven(False, "straight_line")[0]
+    assert "ground_m" not in driven("none", dragging=True)[0].header
+    plane = driven("none", maneuver="straight_line")[0]
     assert (plane.header["ground_m"], len(plane.arrays)) == (0.0, 1)
 
 

@@ -14,7 +14,7 @@ from activesteer.errors import ParameterError, PlaybackError
 from activesteer.learning import TASKS, CarEnv, CarVectorEnv, normalised
 from tests.raising import raises
 
-SHORT = {"overrides": {"duration_s": 0.8}, "interval_s": 0.1}
+SHORT = {"overrides": {"settle_s": 0.2, "duration_s": 0.8}, "interval_s": 0.1}
 """Episodes of eight steps, so that some end while others go on."""
 
 

@@ -117,7 +117,7 @@ def test_without_a_display_the_error_says_so(monkeypatch: pytest.MonkeyPatch) ->
 def _runs_viewer(process: psutil.Process) -> bool:
     """Return True for the viewer; another child may have ended just now and then has no program."""
     try:
-        return Path(process.exe()) == viewer_binary()
+        return Path(process.exe()) == viewer_binary().resolve()
     except psutil.NoSuchProcess:
         return False
 
@@ -150,5 +150,5 @@ def test_web_serves_the_viewer_to_this_machine_until_it_is_interrupted(file: Pat
             time.sleep(0.05)
     finally:
         if process.poll() is None:
-            process.kill()
-            process.communicate()
+            process.send_signal(signal.SIGINT)  # unlike a kill, it ends the viewer too, which would go on for ever
+            process.communicate(timeout=20)

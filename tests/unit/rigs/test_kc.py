@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import functools
 import json
 import math
 from dataclasses import replace
@@ -14,37 +13,32 @@ from activesteer.core.files import json_text
 from activesteer.errors import ParameterError
 from activesteer.plotting import Panel
 from activesteer.resources import models_dir
-from activesteer.rigs.kc import KcResult, draw, kinematics_compliance
+from activesteer.rigs.kc import draw, kinematics_compliance
 from activesteer.rigs.kc.figures import _targets
 from activesteer.rigs.kc.held_car import WheelPose
 from activesteer.rigs.kc.metrics import DEFINITIONS, FORMULAS, load_targets
 from activesteer.rigs.kc.programme import steering_axis
+from tests.bench import on_the_bench
 from tests.raising import raises
-
-
-@functools.cache
-def compact() -> KcResult:
-    return kinematics_compliance()
-
 
 JUDGED = {("rear", "softest_bush")}
 """What the compact may miss; the file of the targets says why."""
 
 
 def test_the_compact_meets_its_targets_but_for_what_is_judged() -> None:
-    missed = {(entry.axle, entry.name): entry.value for entry in compact().outside}
+    missed = {(entry.axle, entry.name): entry.value for entry in on_the_bench().outside}
     assert set(missed) <= JUDGED, missed
-    assert all(entry.remark for entry in compact().outside)
+    assert all(entry.remark for entry in on_the_bench().outside)
 
 
 def test_dry_friction_takes_no_part() -> None:
     """Friction acts equally in both directions: the rig gives the mean of both directions of a sweep."""
     rough = kinematics_compliance("compact", {"friction.front_damper_N": 400.0, "friction.rack_N": 1000.0})
-    assert rough.to_json() == compact().to_json()
+    assert rough.to_json() == on_the_bench().to_json()
 
 
 def test_json_has_what_is_promised() -> None:
-    table = json.loads(json_text(compact().to_json()))
+    table = json.loads(json_text(on_the_bench().to_json()))
     assert set(table) == {"metrics"}
     assert len(table["metrics"]) >= 40
     for row in table["metrics"]:
@@ -72,24 +66,24 @@ def test_every_metric_is_defined() -> None:
 
 
 def test_every_value_of_the_compact_is_a_number() -> None:
-    assert [entry.name for entry in compact().metrics if not math.isfinite(entry.value)] == []
+    assert [entry.name for entry in on_the_bench().metrics if not math.isfinite(entry.value)] == []
 
 
 def test_table_names_every_metric_and_counts_the_bands() -> None:
-    text = compact().table()
-    for entry in compact().metrics:
+    text = on_the_bench().table()
+    for entry in on_the_bench().metrics:
         assert entry.name in text
-    asked = [entry for entry in compact().metrics if entry.band]
-    assert f"{len(asked) - len(compact().outside)} of {len(asked)} target bands met" in text
+    asked = [entry for entry in on_the_bench().metrics if entry.band]
+    assert f"{len(asked) - len(on_the_bench().outside)} of {len(asked)} target bands met" in text
 
 
 def test_an_unknown_metric_is_explained() -> None:
     with raises(ParameterError, value="front.wheelrate"):
-        _ = compact()["front", "wheelrate"]
+        _ = on_the_bench()["front", "wheelrate"]
 
 
 def test_curves_hold_both_wheels_and_go_through_static_ride() -> None:
-    result = compact()
+    result = on_the_bench()
     for sweep in result.curves.values():
         assert (np.diff(sweep.x) > 0.0).all()
         assert sweep.x[sweep.zero] == 0.0
@@ -107,8 +101,8 @@ def test_a_car_without_targets_has_no_bands() -> None:
 
 @pytest.mark.usefixtures("figures")
 def test_a_car_without_bands_gets_no_chart_and_no_count_of_bands(tmp_path: Path) -> None:
-    metrics = tuple(replace(entry, band=None, inside=None) for entry in compact().metrics)
-    result = replace(compact(), metrics=metrics)
+    metrics = tuple(replace(entry, band=None, inside=None) for entry in on_the_bench().metrics)
+    result = replace(on_the_bench(), metrics=metrics)
     paths = draw(result, tmp_path)
     page = paths[-1].read_text("utf-8")
     assert "targets" not in {path.stem for path in paths}
@@ -119,13 +113,13 @@ def test_a_car_without_bands_gets_no_chart_and_no_count_of_bands(tmp_path: Path)
 
 
 def test_the_chart_shows_the_metrics_outside_their_bands_first() -> None:
-    first, *_ = [entry for entry in compact().metrics if entry.inside]
+    first, *_ = [entry for entry in on_the_bench().metrics if entry.inside]
     low, high = first.band or (0.0, 0.0)
     outside = replace(first, value=high + (high - low), inside=False)
-    last = [entry for entry in compact().metrics if entry is not first]
-    (panel,) = _targets(replace(compact(), metrics=(*last, outside))).panels
+    last = [entry for entry in on_the_bench().metrics if entry is not first]
+    (panel,) = _targets(replace(on_the_bench(), metrics=(*last, outside))).panels
     assert isinstance(panel, Panel)
-    count = len(compact().outside) + 1
+    count = len(on_the_bench().outside) + 1
     assert [curve.marker for curve in panel.curves[: count + 1]] == ["D"] * count + ["o"]
     assert outside.name.removeprefix(f"{outside.axle}_").replace("_", " ") in panel.names[count - 1]
 
@@ -186,7 +180,7 @@ def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     (tmp_path / "file").write_text("")
     with raises(ParameterError, cause=FileExistsError):
-        draw(compact(), tmp_path / "file")
+        draw(on_the_bench(), tmp_path / "file")
 
 
 def test_an_override_that_is_no_part_of_the_car_is_explained() -> None:
@@ -197,7 +191,7 @@ def test_an_override_that_is_no_part_of_the_car_is_explained() -> None:
 def test_a_heavier_body_sinks_no_wheel_but_loads_it() -> None:
     """Overrides reach the rig: the static loads follow the mass, and the kinematics of the links hardly change."""
     heavy = kinematics_compliance("compact", {"factors.mass": 1.1})
-    light = compact()
+    light = on_the_bench()
     assert heavy["car", "mass"] == pytest.approx(1.1 * light["car", "mass"], abs=1.0)
     assert heavy["front", "wheel_load"] > 1.05 * light["front", "wheel_load"]
     assert heavy["front", "ride_frequency"] < light["front", "ride_frequency"]

@@ -17,6 +17,10 @@ from tests.raising import raises
 
 FRICTIONS = np.array([0.7, 0.8, 0.9])
 STEPS = 700
+SETTLED: dict[str, Any] = {"settle_s": 0.2}
+STEER: dict[str, Any] = {**SETTLED, "steer.steering_wheel_deg": 30.0}
+SINE: dict[str, Any] = {**SETTLED, "steer.steering_wheel_deg": 90.0}
+"""Amplitudes without a search."""
 
 
 def numbers(simulation: Simulation) -> list[float]:
@@ -28,10 +32,23 @@ def row(batch: Batch, car: int) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("maneuver", "controller"), [("sine_with_dwell", "none"), ("slalom", "ars"), ("brake_in_turn", "afs")]
+    ("maneuver", "controller", "angle"),
+    [
+        ("sine_with_dwell", "none", {"steer.steering_wheel_deg": 90.0}),
+        ("slalom", "ars", {}),
+        ("brake_in_turn", "afs", {"turn.steering_wheel_deg": 40.0}),
+    ],
 )
-def test_each_car_equals_its_simulation_for_any_number_of_threads_and_chunks(maneuver: str, controller: str) -> None:
-    overrides = {"road.mu": FRICTIONS, "sensors.preset": "production", "controllers.bus_delay_s": 0.004}
+def test_each_car_equals_its_simulation_for_any_number_of_threads_and_chunks(
+    maneuver: str, controller: str, angle: dict[str, float]
+) -> None:
+    overrides = {
+        **SETTLED,
+        **angle,
+        "road.mu": FRICTIONS,
+        "sensors.preset": "production",
+        "controllers.bus_delay_s": 0.004,
+    }
     if controller == "none":
         del overrides["controllers.bus_delay_s"]
     two, one = (Batch(maneuver, 3, controller, overrides=overrides, threads=threads) for threads in (2, 1))
@@ -55,7 +72,12 @@ def driven_by_python(simulation: Simulation) -> Simulation:
 
 @pytest.mark.parametrize("sensors", [pytest.param("ideal", marks=pytest.mark.slow), "production"])
 def test_the_law_of_lqr_gives_the_same_bits_in_python_and_in_compiled_code(sensors: str) -> None:
-    both = {"sensors.preset": sensors, "controllers.bus_delay_s": 0.003 if sensors == "production" else 0.0}
+    both = {
+        **SETTLED,
+        "turn.steering_wheel_deg": 40.0,
+        "sensors.preset": sensors,
+        "controllers.bus_delay_s": 0.003 if sensors == "production" else 0.0,
+    }
     cars = [{"road.mu": 0.7}, {"road.mu": 0.9, "factors.mass": 1.1}]
     batch = Batch("brake_in_turn", 2, "lqr", overrides=[both | car for car in cars], threads=2)
     batch.advance(1301)
@@ -75,14 +97,14 @@ def test_the_law_of_lqr_gives_the_same_bits_in_python_and_in_compiled_code(senso
 
 
 def test_a_car_whose_loop_stands_still_keeps_the_kind_of_its_last_command() -> None:
-    batch = Batch("step_steer", 2, "lqr", threads=1)
+    batch = Batch("step_steer", 2, "lqr", overrides=STEER, threads=1)
     batch.advance(20, actuator_command=ActuatorCommand(0.01))
     batch.advance(20, cars=[0])
     assert [loop.commands[1].estimate is None for loop in batch.loops] == [False, True]
 
 
 def test_given_commands_replace_the_blocks() -> None:
-    batch = Batch("step_steer", 2, "ars", overrides={"speed_kmh": 80.0}, threads=1)
+    batch = Batch("step_steer", 2, "ars", overrides=STEER, threads=1)
     rear: Any = np.array([-0.02, 0.03])
     wheel: Any = np.array([0.2, -0.4])
     drivers = DriverCommand(steering_wheel_demand_rad=wheel, drive_torque_demand_Nm=300.0)
@@ -90,7 +112,7 @@ def test_given_commands_replace_the_blocks() -> None:
     batch.advance(200, drivers)
     batch.advance(100)
     for car in range(2):
-        alone = Simulation("step_steer", "ars", overrides={"speed_kmh": 80.0})
+        alone = Simulation("step_steer", "ars", overrides=STEER)
         alone.advance(300, actuator_command=ActuatorCommand(rear_steer_demand_rad=rear[car]))
         alone.advance(200, DriverCommand(steering_wheel_demand_rad=wheel[car], drive_torque_demand_Nm=300.0))
         alone.advance(100)
@@ -108,10 +130,10 @@ def test_a_fault_acts_at_its_time_in_its_car() -> None:
     fault = {"part": "rear", "kind": "stuck", "start_s": 0.3, "end_s": 0.5}
     noisy = {"part": "yaw_rate_sensor", "kind": "offset", "size_degps": 5.0, "start_s": 0.2}
     faults = [[], [fault], [noisy]]
-    batch = Batch("sine_with_dwell", 3, "ars", overrides=[{"fault": each} for each in faults])
+    batch = Batch("sine_with_dwell", 3, "ars", overrides=[SINE | {"fault": each} for each in faults])
     batch.advance(900)
     for car, each in enumerate(faults):
-        alone = Simulation("sine_with_dwell", "ars", overrides={"fault": each})
+        alone = Simulation("sine_with_dwell", "ars", overrides=SINE | {"fault": each})
         alone.advance(900)
         assert row(batch, car) == numbers(alone)
 
@@ -119,7 +141,9 @@ def test_a_fault_acts_at_its_time_in_its_car() -> None:
 @pytest.mark.parametrize("controller", ["ars", "lqr"])
 @pytest.mark.parametrize("twin", [copy.deepcopy, lambda batch: pickle.loads(pickle.dumps(batch))])
 def test_states_and_copies_continue_bit_identically(twin, controller: str) -> None:
-    batch = Batch("double_lane_change", 2, controller, overrides={"road.mu": np.array([0.5, 0.9])}, threads=1)
+    batch = Batch(
+        "double_lane_change", 2, controller, overrides={**SETTLED, "road.mu": np.array([0.5, 0.9])}, threads=1
+    )
     batch.advance(1100)
     (state,), other = batch.save_state([1]), twin(batch)
     expected = batch.advance(400).yaw_rate_radps
@@ -138,14 +162,17 @@ def test_every_controller_and_driver_can_be_driven() -> None:
             return ActuatorCommand(rear_steer_demand_rad=0.05 * measurement.yaw_rate_radps)
 
     for controller in (Damper(), "esc"):
-        batch, alone = Batch("step_steer", 2, controller), Simulation("step_steer", controller)
+        batch, alone = (
+            Batch("step_steer", 2, controller, overrides=STEER),
+            Simulation("step_steer", controller, overrides=STEER),
+        )
         batch.advance(120)
         alone.advance(120)
         assert row(batch, 1) == numbers(alone)
 
 
 def test_a_diverging_car_stops_alone() -> None:
-    batch = Batch("straight_line", 2, overrides={"duration_s": 3.0}, threads=1)
+    batch = Batch("straight_line", 2, overrides={**SETTLED, "duration_s": 3.0}, threads=1)
     batch.loops[0].vehicle.data.qvel[2] = np.nan
     batch.advance(100)
     assert list(batch.failures) == [0]
@@ -182,7 +209,7 @@ def test_a_scenario_gets_its_amplitude_as_in_a_simulation() -> None:
 
 
 def test_wrong_commands_are_refused_before_anything_is_driven() -> None:
-    batch = Batch("straight_line", 2)
+    batch = Batch("straight_line", 2, overrides=SETTLED)
     rear: Any
     for rear, words in ((np.zeros(3), r"shape \(2,\)"), (np.array([0.0, 3.0]), "car 1"), (np.nan, "car 0")):
         with pytest.raises(ControllerError, match=words):
@@ -196,7 +223,7 @@ def test_wrong_commands_are_refused_before_anything_is_driven() -> None:
 
 @pytest.mark.parametrize("steps", [10**400, [1, 2, 3], [[1, 2]], "x", -1, None])
 def test_a_wrong_number_of_steps_is_one_error(steps: Any) -> None:
-    batch = Batch("straight_line", 2)
+    batch = Batch("straight_line", 2, overrides=SETTLED)
     with raises(ParameterError, key="steps"):
         batch.advance(steps)
     assert batch.step_count.tolist() == [0, 0]
@@ -204,22 +231,22 @@ def test_a_wrong_number_of_steps_is_one_error(steps: Any) -> None:
 
 @pytest.mark.parametrize("angle_rad", [10**400, np.array([None, 1.0], dtype=object), np.ones(3), np.ones(2) * 1j])
 def test_a_wrong_command_is_one_error(angle_rad: Any) -> None:
-    batch = Batch("straight_line", 2)
+    batch = Batch("straight_line", 2, overrides=SETTLED)
     with pytest.raises(ActiveSteerError, match="steering_wheel_demand_rad"):
         batch.advance(1, DriverCommand(angle_rad))
     assert batch.step_count.tolist() == [0, 0]
 
 
 def test_a_state_of_another_road_is_refused() -> None:
-    dry, wet = (Batch("straight_line", 1, overrides={"road.mu": mu}) for mu in (0.9, 0.5))
+    dry, wet = (Batch("straight_line", 1, overrides={**SETTLED, "road.mu": mu}) for mu in (0.9, 0.5))
     with raises(ParameterError, key="state"):
         wet.restore_state(dry.save_state())
     wet.restore_state(wet.save_state())
 
 
 def test_friction_and_faults_change_on_the_way_in_some_cars() -> None:
-    batch = Batch("step_steer", 3, "ars")
-    alone = [Simulation("step_steer", "ars") for _ in range(3)]
+    batch = Batch("step_steer", 3, "ars", overrides=STEER)
+    alone = [Simulation("step_steer", "ars", overrides=STEER) for _ in range(3)]
     for each in (batch, *alone):
         each.advance(700)
     batch.set("road.mu", np.array([0.5, 0.6, 0.7]), cars=[0, 2])

@@ -16,7 +16,7 @@ from activesteer.simulation.closed_loop import ClosedLoop
 from tests.physics.runs import STEP_DEG, assert_goes_on_from_its_state
 from tests.raising import raises
 
-STEP = {"steer.steering_wheel_deg": STEP_DEG}
+STEP = {"steer.steering_wheel_deg": STEP_DEG, "settle_s": 0.2, "duration_s": 3.0}
 
 
 class Counting:

@@ -26,11 +26,12 @@ COPIED = {
     "deepcopy": copy.deepcopy,
     "pickle": lambda simulation: pickle.loads(pickle.dumps(simulation)),
 }
-KEYS = {"settle_s": 0.2, "duration_s": 2.0}
+BRAKING = {"settle_s": 0.2, "duration_s": 2.0}
+KEYS = {**BRAKING, "steer.steering_wheel_deg": 30.0}
 RUNS = {
-    "steering": ("step_steer", "ars", {}),
-    "brakes": ("split_mu_braking", "integrated", {}),
-    "estimator and sensors": ("step_steer", "lqr", {"sensors.preset": "production"}),
+    "steering": ("step_steer", "ars", KEYS),
+    "brakes": ("split_mu_braking", "integrated", BRAKING),
+    "estimator and sensors": ("step_steer", "lqr", KEYS | {"sensors.preset": "production"}),
 }
 OWN = """
 from beside import GAIN
@@ -50,7 +51,7 @@ def driven(run: str = "steering", steps: int = 1200, **more: Any) -> Simulation:
     maneuver, controller, keys = RUNS[run]
     if controller == "integrated":
         pytest.importorskip("daqp")
-    simulation = Simulation(maneuver, controller, overrides={**KEYS, **keys}, **more)
+    simulation = Simulation(maneuver, controller, overrides=keys, **more)
     simulation.advance(steps)
     return simulation
 

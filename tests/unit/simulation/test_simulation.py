@@ -22,7 +22,7 @@ from activesteer.scenario import resolve
 from tests.raising import raises
 
 STEP_STEER = {"steer.steering_wheel_deg": 36.5, "duration_s": 1.7, "settle_s": 0.5}
-SLALOM = {"settle_s": 0.5}
+SLALOM = {"settle_s": 0.5, "cones.count": 2, "duration_s": 5.0}
 RUNS = [("step_steer", "ars", STEP_STEER | {"duration_s": 3.0}), ("slalom", "afs", SLALOM)]
 OF_THE_COMMANDS = (
     "ax_mps2",

@@ -58,6 +58,10 @@ def write_controller(folder: Path, kills_at: float, once: str = "") -> str:
     return str(path)
 
 
+TIMESTEP_S: Final = 0.002
+"""Twice the default step, which halves the time of a run."""
+
+
 def short_study(*values: float, key: str = "road.mu", **more: Any) -> dict[str, Any]:
     """Return a study of short runs over the friction of the road, or another key."""
-    return {"maneuvers": [MANEUVER], "factors": {key: {"grid": list(values)}}, **more}
+    return {"maneuvers": [MANEUVER], "timestep_s": TIMESTEP_S, "factors": {key: {"grid": list(values)}}, **more}

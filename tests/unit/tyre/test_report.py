@@ -115,7 +115,8 @@ def test_the_size_needs_all_its_dimensions() -> None:
     assert size(TyreParameters({key: value for key, value in tyre().given.items() if key != "WIDTH"})) is None
 
 
-def test_pictures_are_drawn_into_a_new_folder(tmp_path: Path) -> None:
+def test_pictures_are_drawn_into_a_new_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("activesteer.plotting.drawing.DOTS_PER_INCH", 100)
     paths = draw(tyre(), tmp_path / "new" / "folder")
     assert [path.stem for path in paths] == PICTURES
     for path in paths:

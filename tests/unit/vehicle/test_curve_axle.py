@@ -19,6 +19,7 @@ from activesteer.studies.linear.linearisation import linear_car
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle_builder import new_vehicle
 from activesteer.vehicle_builder.texts import car_table
+from tests.bench import on_the_bench
 from tests.raising import raises
 from tests.unit.vehicle_builder.other_curves import other_axle, other_curves
 
@@ -29,7 +30,7 @@ JOINTS = ("x", "y", "z", "toe", "camber", "caster")
 def guided(tmp_path_factory: pytest.TempPathFactory) -> CarSpec:
     """Return the compact with curves instead of links."""
     folder = tmp_path_factory.mktemp("kc")
-    result = kinematics_compliance("compact")
+    result = on_the_bench()
     write_tables(result, folder)
     (folder / "car.toml").write_text(car_table(load_car("compact"), result), encoding="utf-8")
     return load_car(new_vehicle("guided", folder=folder / "car", kc=folder).vehicle_file)
@@ -97,7 +98,7 @@ def test_the_rig_finds_the_measured_curves(guided: CarSpec) -> None:
 
     Curves of parallel travel know nothing of the load of roll on the top mounts: the roll centre is 2 mm lower.
     """
-    before, after = kinematics_compliance("compact"), kinematics_compliance(Path(guided.mjcf).with_suffix(".toml"))
+    before, after = on_the_bench(), kinematics_compliance(Path(guided.mjcf).with_suffix(".toml"))
     sweeps = [result.curves["parallel_travel"] for result in (before, after)]
     for angle in ("toe_rad", "camber_rad"):
         assert np.degrees(np.abs(getattr(sweeps[0], angle) - getattr(sweeps[1], angle)).max()) < 0.01, angle

@@ -22,6 +22,7 @@ from activesteer.vehicle import Vehicle
 from tests.raising import raises
 
 SPOILED_S = 1.2345
+SHORT = {"settle_s": 0.2, "duration_s": 2.0}
 
 
 def not_a_number(vehicle: Vehicle) -> None:
@@ -76,7 +77,7 @@ def spoil(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Vehicle], None
 
 
 def good_run() -> Recording:
-    return run_scenario(resolve("straight_line", overrides={"duration_s": 3.0}))
+    return run_scenario(resolve("straight_line", overrides=SHORT))
 
 
 @pytest.mark.parametrize("change", SPOILERS)
@@ -102,7 +103,7 @@ def test_what_was_recorded_is_on_disk_and_opens(
     spoil(change)
     path = tmp_path / "broken.mcap"
     with pytest.raises(SimulationDiverged) as caught:
-        run_scenario(resolve("straight_line", overrides={"duration_s": 3.0}), path=path)
+        run_scenario(resolve("straight_line", overrides=SHORT), path=path)
     assert any(str(path) in note for note in caught.value.__notes__)
     opened = Recording.open(path)
     assert len(opened) == len(caught.value.recording)
@@ -126,7 +127,7 @@ def test_no_row_after_the_failure_looks_like_a_car_that_drives_on(
 
 
 def test_a_warning_of_the_engine_ends_the_run() -> None:
-    simulation = ClosedLoop(resolve("straight_line"))
+    simulation = ClosedLoop(resolve("straight_line", overrides=SHORT))
     simulation.advance(10)
     simulation.vehicle.data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number += 1
     with raises(SimulationDiverged, value=mujoco.mjtWarning.mjWARN_INERTIA):
@@ -134,7 +135,7 @@ def test_a_warning_of_the_engine_ends_the_run() -> None:
 
 
 def test_without_a_fault_nothing_is_reported() -> None:
-    simulation = ClosedLoop(resolve("straight_line"))
+    simulation = ClosedLoop(resolve("straight_line", overrides=SHORT))
     simulation.advance(300)
     simulation.vehicle.check()
 
@@ -160,7 +161,7 @@ def test_command_that_is_no_number_ends_the_run_with_its_name(block, field, name
             **{field: (0.0, 0.0, np.nan, 0.0) if field.startswith("brake_t") else np.nan}
         )
 
-    loop = ClosedLoop(resolve("straight_line"), "ars")
+    loop = ClosedLoop(resolve("straight_line", overrides=SHORT), "ars")
     monkeypatch.setattr(block, "step", spoiled)
     with raises(SimulationDiverged, value=name):
         loop.advance(1)

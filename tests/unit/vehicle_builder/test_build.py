@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 
 import mujoco
@@ -15,6 +14,7 @@ from activesteer.resources import models_dir
 from activesteer.rigs.kc import KcResult, kinematics_compliance
 from activesteer.vehicle.statics import mass_properties
 from activesteer.vehicle_builder import NewVehicle, build, new_vehicle
+from tests.bench import on_the_bench
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 
@@ -31,18 +31,13 @@ def again(cars: dict[str, NewVehicle]) -> KcResult:
     return kinematics_compliance(cars["again"].vehicle_file)
 
 
-@functools.cache
-def compact() -> KcResult:
-    return kinematics_compliance("compact")
-
-
 @pytest.mark.parametrize("sweep", ["parallel_travel", "opposite_travel", "parallel_kinematic", "lateral_in_phase",
                                    "longitudinal_patch", "aligning_in_phase", "steering_rolling"])  # fmt: skip
 def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(again: KcResult, sweep: str) -> None:
     """Within 0.01 deg over +-80 mm and full lock: spring forces and wheel angles come from a new trim, not from a
     copy."""
     for angle in ("toe_rad", "camber_rad"):
-        one, two = (getattr(result.curves[sweep], angle) for result in (compact(), again))
+        one, two = (getattr(result.curves[sweep], angle) for result in (on_the_bench(), again))
         assert np.degrees(np.abs(one - two)).max() < 0.01, angle
 
 
@@ -54,7 +49,7 @@ def test_the_compacts_hardpoints_give_the_compacts_toe_and_camber(again: KcResul
      ("car", "body_roll_damping", 2e-3), ("rear", "wheel_hop_frequency", 1e-3), ("car", "roll_gradient", 2e-3)],
 )  # fmt: skip
 def test_the_compacts_numbers_come_back(again: KcResult, axle: str, name: str, share: float) -> None:
-    assert again[axle, name] == pytest.approx(compact()[axle, name], rel=share)
+    assert again[axle, name] == pytest.approx(on_the_bench()[axle, name], rel=share)
 
 
 def test_what_is_left_of_the_whole_car_is_the_compacts_chassis(cars: dict[str, NewVehicle]) -> None:
@@ -107,7 +102,7 @@ def test_a_stiff_top_mount_leaves_the_camber_to_the_links(tmp_path: Path) -> Non
         COMPACT, tmp_path, ("radial_Npm = 3e5", "radial_Npm = 1e9"), ("axial_Npm = 1.2e6", "axial_Npm = 1e9")
     )
     stiff = kinematics_compliance(new_vehicle("stiff", table, tmp_path / "stiff").vehicle_file)
-    given = compact()["front", "side_force_camber"] - stiff["front", "side_force_camber"]
+    given = on_the_bench()["front", "side_force_camber"] - stiff["front", "side_force_camber"]
     assert given == pytest.approx(np.degrees(1e3 * 0.19 / 0.67 / 3e5 / 0.67), rel=0.1)
 
 
@@ -134,8 +129,10 @@ def test_tie_rods_ahead_of_the_axle_turn_the_rack_round(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rear", ["multilink", "double_wishbone"])
-def test_every_suspension_stands_and_has_one_way_to_travel(tmp_path: Path, rear: str) -> None:
-    table = WISHBONE
+def test_every_suspension_stands_and_has_one_way_to_travel(
+    cars: dict[str, NewVehicle], tmp_path: Path, rear: str
+) -> None:
+    made = cars["saloon"]
     if rear == "double_wishbone":
         lines = [
             line
@@ -154,10 +151,12 @@ def test_every_suspension_stands_and_has_one_way_to_travel(tmp_path: Path, rear:
         table.write_text(
             text.replace("rear.spring_outer,        -2690, 570, 160", "rear.spring_outer, -2776, 600, 140")
         )
-    made = new_vehicle("car", table, tmp_path / "car")
+        made = new_vehicle("car", table, tmp_path / "car")
     result = kinematics_compliance(made.vehicle_file)
     assert result["car", "left_right_difference"] < 1e-6
     assert result["rear", "ride_frequency"] == pytest.approx(1.35, rel=2e-3)
+    assert result["front", "ride_frequency"] == pytest.approx(1.2, abs=0.003)
+    assert result["front", "steering_ratio"] == pytest.approx(15.5, abs=0.02)
     assert result["front", "damper_ratio"] == pytest.approx(0.518, abs=0.003)
     model = result.measured.vehicle.model
     for corner in CORNERS:

@@ -22,7 +22,7 @@ from activesteer.scenario import resolve
 HERE = Path(__file__).parent
 EXAMPLES = Path(__file__).resolve().parents[4] / "examples" / "fmu"
 MEASUREMENT = Measurement(0.0, 20.0, math.radians(5.0), 0.0, 0.0, 0.0, 0.0, 0.0, (60.0, 60.0, 60.0, 60.0))
-SHORT = {"duration_s": 1.0}
+SHORT = {"settle_s": 0.5, "duration_s": 1.0}
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 pytestmark = [needs_compiler, pytest.mark.skipif(importlib.util.find_spec("fmpy") is None, reason="needs fmpy")]
 
@@ -68,8 +68,9 @@ def made(given, **setup):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_papers_afs_in_c_equals_the_built_in_controller_to_the_last_bit(fmus, version):
-    ours = activesteer.simulate("sine_with_dwell", "afs")
-    theirs = activesteer.simulate("sine_with_dwell", fmus / f"paper_afs_fmi{version}.fmu")
+    angle = {"settle_s": 0.5, "steer.steering_wheel_deg": 140.0}
+    ours = activesteer.simulate("sine_with_dwell", "afs", overrides=angle)
+    theirs = activesteer.simulate("sine_with_dwell", fmus / f"paper_afs_fmi{version}.fmu", overrides=angle)
     assert np.ptp(ours["superposition_demand_rad"]) > 0.01
     for channel in ours.channels:
         assert np.array_equal(ours[channel.name], theirs[channel.name]), channel.name
@@ -179,7 +180,7 @@ def test_an_fmu_that_cannot_save_its_state_says_so(fmus, tmp_path):
 def test_a_failure_is_one_typed_error_and_the_recording_is_kept(fmus, fault, said):
     controller = f"{fmus}/faulty_fmi{2 + fault % 2}.fmu?fault={fault}"
     with pytest.raises(ControllerError, match=said) as caught:
-        activesteer.simulate("straight_line", controller, overrides={"settle_s": 0.5, **SHORT})
+        activesteer.simulate("straight_line", controller, overrides=SHORT)
     assert 490 <= len(caught.value.recording) <= 500
 
 
@@ -188,9 +189,7 @@ def test_a_failure_is_one_typed_error_and_the_recording_is_kept(fmus, fault, sai
 )
 def test_an_isolated_fmu_may_crash_or_hang(fmus, fault, said):
     with pytest.raises(ControllerError, match=said) as caught:
-        activesteer.simulate(
-            "straight_line", f"{fmus}/faulty_fmi2.fmu?isolate=1&fault={fault}", overrides={"settle_s": 0.5, **SHORT}
-        )
+        activesteer.simulate("straight_line", f"{fmus}/faulty_fmi2.fmu?isolate=1&fault={fault}", overrides=SHORT)
     assert 490 <= len(caught.value.recording) <= 500
 
 

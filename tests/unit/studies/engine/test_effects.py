@@ -12,6 +12,7 @@ from activesteer.studies.engine.analysis import without_effect
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.store import Store
 from activesteer.studies.engine.study_file import read_study
+from tests.unit.studies.short import TIMESTEP_S
 
 MINE = """
 from activesteer import ActuatorCommand
@@ -31,8 +32,13 @@ GAIN, UNUSED = "controllers.Mine.gain", "controllers.Mine.unused"
 def table(tmp_path) -> dict[str, Any]:
     path = tmp_path / "mine.py"
     path.write_text(MINE)
-    short = {"duration_s": 2.6, "settle_s": 0.05, "steer.start_s": 0.05}
-    return {"maneuvers": ["step_steer"], "controllers": ["none", f"{path}:Mine"], "overrides": short}
+    short = {"duration_s": 2.6, "settle_s": 0.05, "steer.start_s": 0.05, "steer.steering_wheel_deg": 36.5}
+    return {
+        "timestep_s": TIMESTEP_S,
+        "maneuvers": ["step_steer"],
+        "controllers": ["none", f"{path}:Mine"],
+        "overrides": short,
+    }
 
 
 @pytest.mark.parametrize("kind", ["grid", pytest.param("uniform", marks=pytest.mark.slow)])

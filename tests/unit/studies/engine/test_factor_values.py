@@ -14,13 +14,13 @@ from activesteer.studies.engine.factor_values import FactorValues
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.study_file import read_study
 from tests.raising import raises
-from tests.unit.studies.short import MANEUVER
+from tests.unit.studies.short import MANEUVER, TIMESTEP_S
 
 OTHER = {**MANEUVER, "name": "other", "speed_kmh": 60, "road": {"mu": 0.5}}
 
 
 def table(**factors: object) -> dict[str, object]:
-    return {"maneuvers": [MANEUVER, OTHER], "factors": factors, "design": {"samples": 4}}
+    return {"maneuvers": [MANEUVER, OTHER], "factors": factors, "design": {"samples": 4}, "timestep_s": TIMESTEP_S}
 
 
 def test_a_relative_factor_starts_from_each_manoeuvre() -> None:

@@ -18,11 +18,12 @@ from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import read_study
 from activesteer.studies.engine.tuning import _plausible, _searches, read_tuning, tune
 from tests.raising import raises
-from tests.unit.studies.short import MANEUVER, RATIO, write_controller
+from tests.unit.studies.short import MANEUVER, RATIO, TIMESTEP_S, write_controller
 
 WHEEL = "maneuver.steer.steering_wheel_deg"
 STUDY: dict[str, Any] = {
-    "maneuvers": [MANEUVER], "controllers": ["none"], "factors": {WHEEL: {"uniform": [5.0, 30.0]}},
+    "maneuvers": [MANEUVER], "timestep_s": TIMESTEP_S, "controllers": ["none"],
+    "factors": {WHEEL: {"uniform": [5.0, 30.0]}},
 }  # fmt: skip
 GAINS: dict[str, Any] = {
     **STUDY,

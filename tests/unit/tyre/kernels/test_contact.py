@@ -116,7 +116,7 @@ def test_a_tyre_at_rest_is_the_spring_of_its_carcass(load_N: float, direction: i
 @pytest.mark.parametrize("velocity_mps", [(0.3, 0.0), (0.0, 0.3), (-0.2, 0.2), (1.2, -0.4), (0.0, 5.0)])
 def test_a_sliding_tyre_at_rest_pulls_with_its_friction(mu: float, velocity_mps: tuple[float, float]) -> None:
     rig = TyreRig(tyre(), mu=mu)
-    forces = _moved(rig, np.tile(velocity_mps, (2000, 1)))
+    forces = _moved(rig, np.tile(velocity_mps, (1000, 1)))
     horizontal = np.hypot(*forces.force_N[:, :2].T)
     kappa, alpha = np.meshgrid(np.linspace(-1.5, 1.5, 301), np.linspace(-1.5, 1.5, 301))
     envelope = rig.formula.evaluate(LOAD_N, kappa, alpha, vx_mps=velocity_mps[0], road_friction=mu)
@@ -130,7 +130,7 @@ def test_a_sliding_tyre_at_rest_pulls_with_its_friction(mu: float, velocity_mps:
 @pytest.mark.parametrize("angle_deg", range(-150, 181, 30))
 def test_a_tyre_dragged_from_rest_pulls_against_its_sliding(mu: float, angle_deg: float) -> None:
     direction = np.array([math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))])
-    force = _moved(TyreRig(tyre(), mu=mu), np.tile(0.2 * direction, (2000, 1))).force_N[-1, :2]
+    force = _moved(TyreRig(tyre(), mu=mu), np.tile(0.2 * direction, (1000, 1))).force_N[-1, :2]
     # The formula's own forces at combined slip are some degrees off the direction of slip.
     assert -(force @ direction) > math.cos(math.radians(8.0)) * np.hypot(*force)
     assert np.hypot(*force) == pytest.approx(mu * LOAD_N, rel=0.1)
