@@ -237,6 +237,8 @@ class Page(NamedTuple):
                 for text in map(_plain, filter(None, (section.title, *section.texts))):
                     yield from wrapped_line(text)
             for table in section.tables:
+                if table.title:
+                    yield from wrapped_line(_plain(table.title))
                 yield from table.lines()
 
 

@@ -81,6 +81,11 @@ def test_lines_of_a_cell_are_apart_in_the_terminal():
     assert list(Table("", ["parameter"], [[cell]]).lines())[1] == "  anti-roll bar <1>, factors.anti_roll_bar"
 
 
+def test_the_terminal_shows_the_titles_of_sections_and_tables():
+    table = Table("Correlation", ["parameter"], [["mass"]])
+    assert list(Page("t", "Fit", [], [Section("Steps", tables=[table])]).lines())[:3] == ["Fit", "Steps", "Correlation"]
+
+
 def test_a_long_curve_keeps_its_shortest_peak():
     y = np.zeros(100_000)
     y[54_321] = 7.0
