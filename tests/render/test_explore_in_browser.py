@@ -211,6 +211,26 @@ def test_both_tabs_have_their_parts_in_sight(browser: Browser, served: tuple[str
 
 
 @pytest.mark.slow
+def test_a_hint_names_the_key_that_is_meant_and_leaves_the_road_free(
+    browser: Browser, served: tuple[str, Path]
+) -> None:
+    page, problems = opened(browser, served[0] + "#maneuver=step_steer&controllers=none&mu=0.5", **PHONE)
+    page.wait_for_selector(DONE, timeout=LIMIT_MS)
+    assert "mu (there is road.mu)" in page.inner_text("#message")
+    page.close()
+    page, problems = opened(browser, served[0] + "#drive=slippery&sped=3", **PHONE)
+    page.wait_for_selector("#start:enabled", timeout=LIMIT_MS)
+    assert page.is_visible("#alert")
+    page.tap("#start")
+    page.wait_for_selector("#end:visible", timeout=LIMIT_MS)
+    assert not page.is_visible("#alert")
+    page.tap("#end")
+    page.wait_for_selector("#drive-report:visible", timeout=LIMIT_MS)
+    assert problems == []
+    page.close()
+
+
+@pytest.mark.slow
 def test_a_telephone_on_its_side_has_room_for_thumbs(browser: Browser, served: tuple[str, Path]) -> None:
     page, problems = opened(browser, served[0], **PHONE | {"viewport": {"width": 844, "height": 390}})
     page.wait_for_selector(DONE, timeout=LIMIT_MS)

@@ -33,9 +33,8 @@ export function nextSide({ cones, lanes, line }, x) {
 }
 
 export class Drive {
-  constructor(socket, say) {
-    this.socket = socket;
-    this.say = say;
+  constructor(socket, say, unhint) {
+    Object.assign(this, { socket, say, unhint });
     this.pressed = new Set();
     this.shown = this.running = this.held = this.again = false;
     this.number = this.asked = 0;
@@ -211,6 +210,7 @@ export class Drive {
   going() {
     this.running = this.compared = true;
     this.scene.moving(true);
+    this.unhint(); // a hint takes height from the road
     this.again = this.kept = false;
     this.fold();
     this.latencies = [];

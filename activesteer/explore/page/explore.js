@@ -27,7 +27,7 @@ const state = { id: 0, runs: new Map(), ghosts: new Map(), values: {}, sliders: 
 window.activesteer = state; // for tests and the curious
 
 const socket = new Socket((header, arrays) => (hear[header.kind] ?? (() => {}))(header, arrays), (text) => { without(text, false); drive.lost(); });
-const drive = new Drive(socket, say);
+const drive = new Drive(socket, say, unhint);
 
 const NAMED = ["maneuver", "vehicle", "driver"];
 const places = new Map(); // name of a controller -> place of its colour
@@ -77,7 +77,7 @@ function writeAddress() {
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
   $("reset").disabled = !Object.keys(state.values).length;
-  $("explained").textContent = controllers.map((name) => explained(name, state.titles)).join("; ");
+  $("explained").textContent = controllers.filter((name) => state.titles[name]).map((name) => explained(name, state.titles)).join("; ");
   $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
 }
 
@@ -151,7 +151,11 @@ const hear = {
     }
     // A slider may be missing for another controller; a key of an address must mean something.
     const unknown = state.addressed ? Object.keys(state.wanted).filter((key) => ![...NAMED, "controllers"].includes(key) && !header.sliders.some((slider) => slider.key === key)) : [];
-    if (unknown.length) told.push(`The address has ${unknown.length > 1 ? "keys" : "a key"} without a slider here: ${unknown.join(", ")}.`);
+    const meant = (key) => {
+      const full = header.sliders.filter((slider) => slider.key.endsWith(`.${key}`)).map((slider) => slider.key);
+      return full.length ? `${key} (there is ${full.join(", ")})` : key;
+    };
+    if (unknown.length) told.push(`The address has ${unknown.length > 1 ? "keys" : "a key"} without a slider here: ${unknown.map(meant).join(", ")}.`);
     state.addressed = false;
     if (told.length) say(told.join(" "), true);
     state.wanted = {};

@@ -60,7 +60,8 @@ def driven(tmp_path: Path, events: str) -> Any:
         tmp_path,
         f"""import {{ $ }} from "./fake.mjs";
         import {{ Drive, nextSide, wayBack }} from "./drive.mjs";
-        const sent = [], drive = new Drive({{ send: (message) => sent.push(message) }}, () => {{}});
+        const sent = [], unhint = () => {{ sent.unhinted = (sent.unhinted ?? 0) + 1; }};
+        const drive = new Drive({{ send: (message) => sent.push(message) }}, () => {{}}, unhint);
         const key = (name, down = true) => $("window").fire(down ? "keydown" : "keyup", {{ key: name }});
         const ready = () => drive.begin({{ id: drive.asked, cones: [], lanes: [], line: [], radius_m: 0 }}, []);
         const frame = (more) => drive.frame({{ time_s: 1, speed_kmh: 60, sideslip_deg: 0, friction_use: 1.02,
@@ -391,7 +392,7 @@ def test_an_address_names_own_files_and_values_of_sliders(tmp_path: Path) -> Non
 @pytest.mark.parametrize(("address", "value", "words"), [
     ("speed_kmh=abc", None, "speed_kmh=abc is not a number"),
     ("speed_kmh=999", 160, "speed 999 is outside 20 to 160 km/h"),
-    ("speed_kmh=90&sped=3", 90, "a key without a slider here: sped"),
+    ("speed_kmh=90&sped=3", 90, "a key without a slider here: sped."),
     ("speed_kmh=90", 90, ""),
 ])  # fmt: skip
 def test_what_is_wrong_in_an_address_is_told(address: str, value: float | None, words: str, tmp_path: Path) -> None:
@@ -553,3 +554,9 @@ def test_the_name_of_an_own_controller_breaks_after_its_file(tmp_path: Path) -> 
         $("saved").textContent = JSON.stringify(labels.map((one) => one.querySelectorAll("wbr").length));""",
     )
     assert json.loads(page["saved"])[-2:] == [0, 1]
+
+
+def test_a_hint_goes_when_the_drive_starts(tmp_path: Path) -> None:
+    assert driven(tmp_path, f"const before = sent.unhinted; {GO} globalThis.seen = [before ?? 0, sent.unhinted];")[
+        "result"
+    ] == [0, 1]
