@@ -18,6 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.controllers.registry import CONTROLLERS
 from activesteer.core.conventions import CORNERS
 from activesteer.native.compilation import compiled
 from activesteer.scenario import Scenario, resolve
@@ -115,8 +116,6 @@ def _sense_and_brake(rows, chains, memory, radii_m, timestep_s, setup, state):
     return held
 
 
-_PYTHON: Final = ("esc", "tv", "ars_sideslip", "observer", "integrated")
-"""Controllers of the package in Python."""
 _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
@@ -129,20 +128,15 @@ def print_blocks() -> None:
 
 
 def print_controllers() -> None:
-    """Print the additional time per step of the step steer of each controller in Python, with production sensors."""
+    """Print the additional time per step of each controller in the step steer, with production sensors."""
     compact = with_amplitude_found(resolve("step_steer", overrides=_PRODUCTION))
     motors = with_amplitude_found(resolve("step_steer", "compact_electric", overrides=_PRODUCTION))
-    cars = {name: motors if name == "tv" else compact for name in _PYTHON}
-    found = {
-        name: [
-            min(times)
-            for times in zip(
-                *((closed_loop_us(car, "none"), closed_loop_us(car, name)) for _ in range(_ROUNDS)), strict=True
-            )
-        ]
-        for name, car in cars.items()
-    }
-    for name, (without_us, with_us) in found.items():
+    for name in CONTROLLERS:
+        if name == "none":
+            continue
+        car = motors if name == "tv" else compact
+        rounds = [(closed_loop_us(car, "none"), closed_loop_us(car, name)) for _ in range(_ROUNDS)]
+        without_us, with_us = np.min(rounds, axis=0)
         print(f"{name:14} {with_us - without_us:6.2f} us in addition to {without_us:.1f} us")
 
 
@@ -151,13 +145,16 @@ def print_engine(vehicles: Sequence[str]) -> None:
     for vehicle in vehicles:
         for maneuver in ("step_steer", "slalom", "sine_with_dwell"):
             driven = KeptInputs(with_amplitude_found(resolve(maneuver, vehicle)), 1500)
-            plan = driven.vehicle._implicit.plan
-            best = {}
-            for _ in range(_ROUNDS):
-                for direct in (0, 1):
-                    plan["direct"] = direct
-                    best[direct] = min(best.get(direct, np.inf), driven.replay_us())
-            print(f"{vehicle:20} {maneuver:16} {best[0]:6.1f} {best[1]:6.1f} us")
+            solver_us, direct_us = np.min(
+                [(_replay_us(driven, 0), _replay_us(driven, 1)) for _ in range(_ROUNDS)], axis=0
+            )
+            print(f"{vehicle:20} {maneuver:16} {solver_us:6.1f} {direct_us:6.1f} us")
+
+
+def _replay_us(driven: KeptInputs, direct: int) -> float:
+    """Return the engine's time per step with MuJoCo's solver (0) or the direct solution (1) [us]."""
+    driven.vehicle._implicit.plan["direct"] = direct
+    return driven.replay_us()
 
 
 def _positions_m(driven: KeptInputs) -> NDArray[np.float64]:
@@ -174,16 +171,14 @@ def print_accuracy(vehicles: Sequence[str]) -> None:
     """Print time per step and error of the position after 2.5 s of slalom, for tolerances of MuJoCo's solver."""
     for vehicle in vehicles:
         driven = KeptInputs(resolve("slalom", vehicle), 2500)
-        model, plan = driven.vehicle.model, driven.vehicle._implicit.plan
-        best_us = min(driven.replay_us() for _ in range(_ROUNDS))
+        direct_us = min(_replay_us(driven, 1) for _ in range(_ROUNDS))
         exact = _positions_m(driven)
-        print(f"{vehicle:16} direct {best_us:6.1f} us")
-        plan["direct"] = 0
+        print(f"{vehicle:16} direct {direct_us:6.1f} us")
         for exponent in (13, 12, 10, 8, 6, 5, 4, 3):
-            model.opt.tolerance = 10.0**-exponent
-            best_us = min(driven.replay_us() for _ in range(_ROUNDS))
+            driven.vehicle.model.opt.tolerance = 10.0**-exponent
+            solver_us = min(_replay_us(driven, 0) for _ in range(_ROUNDS))
             error_m = np.linalg.norm(_positions_m(driven) - exact, axis=1).max()
-            print(f"{vehicle:16} 1e-{exponent:<4} {best_us:6.1f} us {error_m:8.0e} m")
+            print(f"{vehicle:16} 1e-{exponent:<4} {solver_us:6.1f} us {error_m:8.0e} m")
 
 
 if __name__ == "__main__":
