@@ -44,6 +44,19 @@ class SyntheticRun:
         return self.channels[name]
 
 
+def elsewhere(run: SyntheticRun, turn_rad: float, x_m: float = 30.0, y_m: float = -12.0) -> SyntheticRun:
+    """Return the same run in a world that is turned and moved, with its yaw angle between -pi and pi."""
+    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
+    channels = dict(run.channels)
+    for name in [name.removesuffix("x_m") for name in channels if name == "x_m" or name.endswith("_x_m")]:
+        x, y = channels[f"{name}x_m"], channels[f"{name}y_m"]
+        channels[f"{name}x_m"], channels[f"{name}y_m"] = x_m + cos * x - sin * y, y_m + sin * x + cos * y
+    channels["yaw_rad"] = np.angle(np.exp(1j * (channels["yaw_rad"] + turn_rad)))
+    moved = SyntheticRun(run.time_s, channels)
+    moved.metadata = run.metadata
+    return moved
+
+
 Response = Callable[[np.ndarray], np.ndarray]
 
 

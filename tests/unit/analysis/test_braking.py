@@ -12,7 +12,7 @@ from activesteer.analysis.metrics import metrics
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import RecordingError
 from tests.raising import raises
-from tests.unit.analysis.synthetic import SyntheticRun
+from tests.unit.analysis.synthetic import SyntheticRun, elsewhere
 
 SPEED_MPS, DECELERATION_MPS2, PEAK = 25.0, 6.0, 0.8
 RADIUS_M = 0.3
@@ -49,6 +49,36 @@ def test_a_constant_deceleration_is_found_with_its_distance_and_efficiency() -> 
     assert found["speed_begin_mps"] == pytest.approx(SPEED_MPS, rel=1e-3)
     assert found["yaw_rate_peak_abs_radps"] == 0.02
     assert found["brake_pressure_peak_Pa"] == 50e5
+    # The car drifts by 10 mm/s until it stands, and no further.
+    assert found["lateral_deviation_max_m"] == pytest.approx(0.01 * SPEED_MPS / DECELERATION_MPS2, rel=0.01)
+    assert found["braking_begin_time_s"] == pytest.approx(1.0, abs=2e-3)
+
+
+def test_a_stop_is_the_same_in_every_direction() -> None:
+    run = stopping()
+    run.channels["yaw_rad"] = 0.05 * np.maximum(run.time_s - 1.0, 0.0)
+    expected = straight_braking_metrics(run)
+    assert expected["heading_end_rad"] == pytest.approx(0.05 * SPEED_MPS / DECELERATION_MPS2, rel=0.01)
+    # The heading passes half a turn, where its angle may jump.
+    for turn_rad in (0.7, math.pi - 0.1):
+        found = straight_braking_metrics(elsewhere(run, turn_rad))
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_the_efficiency_counts_the_peak_friction_by_distance() -> None:
+    run = stopping()
+    # Beyond the first half of the distance the friction is half as large, and the tyres use twice as much of it.
+    worse = run["x_m"] > 25.0 + 0.5 * SPEED_MPS**2 / (2.0 * DECELERATION_MPS2)
+    for corner in CORNERS:
+        run.channels[f"{corner}_friction_utilisation"] = run[f"{corner}_friction_utilisation"] * np.where(
+            worse, 2.0, 1.0
+        )
+    whole = SPEED_MPS**2 / (2.0 * DECELERATION_MPS2)
+    begin, end = (1.0 - 0.8**2) * whole, (1.0 - 0.1**2) * whole
+    share = (end - 0.5 * whole) / (end - begin)
+    allowed = 9.80665 * PEAK * (1.0 - 0.5 * share)
+    found = straight_braking_metrics(run)["braking_efficiency"]
+    assert found == pytest.approx(DECELERATION_MPS2 / allowed, rel=2e-3)
 
 
 @pytest.mark.parametrize("slip", [0.1, 0.4, 1.0])
@@ -121,6 +151,27 @@ def test_a_run_that_ends_within_the_second_has_no_deviation():
     assert math.isnan(values["yaw_rate_deviation_after_1000ms_radps"])
     assert math.isnan(values["path_deviation_after_1000ms_m"])
     assert values["mean_deceleration_mps2"] == pytest.approx(TURN_MPS2, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_turn_is_the_same_in_every_direction_and_from_the_course_of_a_car_that_slides(side):
+    run = braking(side, turn_in=0.1, outside_m=2.0)
+    expected = metrics(run)
+    assert metrics(elsewhere(run, 0.7)) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    # The circle lies beside the direction of motion, not beside the heading.
+    run.channels["yaw_rad"] = run["yaw_rad"] + 0.2
+    run.channels["sideslip_rad"] = run["sideslip_rad"] - 0.2
+    found = metrics(run)
+    assert found["path_deviation_after_1000ms_m"] == pytest.approx(expected["path_deviation_after_1000ms_m"], abs=1e-9)
+
+
+def test_deceleration_ends_when_the_pedal_is_released():
+    run = braking()
+    released = run.time_s >= BRAKE_S + 1.0
+    run.channels["brake_pedal"] = np.where(released, 0.0, run["brake_pedal"])
+    run.channels["speed_mps"] = np.where(released, TURN_MPS - TURN_MPS2, run["speed_mps"])
+    assert metrics(run)["mean_deceleration_mps2"] == pytest.approx(TURN_MPS2, rel=2e-3)
+    assert metrics(run)["speed_end_mps"] == pytest.approx(TURN_MPS - TURN_MPS2)
 
 
 def test_deceleration_ends_at_standstill():

@@ -19,14 +19,18 @@ EG, ROLL, REAR = 0.0045, 0.009, 0.004
 
 
 def run(
-    kind: str = "slowly_increasing_steer", side: float = 1.0, knee_mps2: float = 4.0, top_mps2: float = 8.0
+    kind: str = "slowly_increasing_steer",
+    side: float = 1.0,
+    knee_mps2: float = 4.0,
+    top_mps2: float = 8.0,
+    lag_rad: float = 0.0,
 ) -> SyntheticRun:
     """Lateral acceleration rises to its limit; above the knee, the steer angle rises faster than the line."""
     time_s = np.arange(40001) * 0.001
     ay = np.minimum(time_s / 35.0, 1.0) * top_mps2
     speed = np.full_like(ay, 22.0) if kind == "slowly_increasing_steer" else np.sqrt(np.maximum(ay, 0.01) * 100.0)
     curvature = ay / speed**2
-    steer = CAR.wheelbase_m * curvature + EG * ay + 0.02 * np.maximum(ay - knee_mps2, 0.0)
+    steer = lag_rad + CAR.wheelbase_m * curvature + EG * ay + 0.02 * np.maximum(ay - knee_mps2, 0.0)
     sideslip = CAR.cg_to_rear_m * curvature - REAR * ay
     channels = {
         "ay_mps2": ay, "steering_wheel_rad": CAR.steering_ratio * steer, "yaw_rate_radps": curvature * speed,
@@ -64,11 +68,15 @@ def test_gains_belong_to_constant_speed():
     assert math.isnan(found["steering_wheel_gain_mps2prad"])
 
 
-def test_linear_range_ends_where_the_steer_angle_is_five_percent_off():
+@pytest.mark.parametrize("lag_rad", [0.0, 0.02])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_linear_range_ends_where_the_steer_angle_is_five_percent_off(lag_rad, side):
     line = EG + 2.6 / 22.0**2
-    expected = 0.02 * 4.0 / (0.02 - 0.05 * line)
-    assert evaluate(run())["linear_range_mps2"] == pytest.approx(expected, abs=0.1)
-    assert math.isnan(evaluate(run(knee_mps2=9.0))["linear_range_mps2"])
+    expected = (0.02 * 4.0 + 0.05 * lag_rad) / (0.02 - 0.05 * line)
+    found = evaluate(run(side=side, lag_rad=lag_rad))
+    assert found["linear_range_mps2"] == pytest.approx(expected, abs=0.02)
+    assert found["understeer_gradient_radpmps2"] == pytest.approx(EG, rel=1e-6)
+    assert math.isnan(evaluate(run(knee_mps2=9.0, lag_rad=lag_rad))["linear_range_mps2"])
 
 
 def test_limit_is_the_largest_acceleration():

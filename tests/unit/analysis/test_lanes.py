@@ -10,13 +10,16 @@ import pytest
 from activesteer.analysis.lanes import (
     cone_distances,
     first_at,
+    heading_at_end,
     lane_overstep,
     largest_difference,
     path_distance,
+    places_along,
     track_over_x,
 )
 from activesteer.analysis.path_following import path_following_metrics
 from activesteer.analysis.source import read_course, read_footprint
+from activesteer.core.path import Path
 from activesteer.road.course import CONE_RADIUS_M, FRONT_OVERHANG_M, REAR_OVERHANG_M
 from tests.unit.analysis.synthetic import LANES, WHEELBASE_M, WIDTH_M, SyntheticRun, along_path, offset_track
 
@@ -152,6 +155,30 @@ def test_distance_from_a_circle_of_points_is_that_from_the_circle():
         9.0 * np.cos(angle[3:-3:7]), 9.0 * np.sin(angle[3:-3:7]), 10.0 * np.cos(angle), 10.0 * np.sin(angle)
     )
     np.testing.assert_allclose(distances, 1.0, atol=1e-3)
+
+
+CIRCLE_M = 10.0
+
+
+@pytest.mark.parametrize("outside_m", [2.0, -2.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_place_along_a_circle_and_beside_it(outside_m, side):
+    angle = np.linspace(0.0, 1.5 * math.pi, 95)
+    path = Path.through(CIRCLE_M * np.sin(angle), side * CIRCLE_M * (1.0 - np.cos(angle)))
+    driven, radius = np.linspace(0.1, 4.0, 200), CIRCLE_M + outside_m
+    along, left = places_along(radius * np.sin(driven), side * (CIRCLE_M - radius * np.cos(driven)), path)
+    # Points 0.5 m apart: beside the tangent at the nearest point the circle is 4 mm further.
+    np.testing.assert_allclose(left, -side * outside_m, atol=0.005)
+    np.testing.assert_allclose(along, CIRCLE_M * driven, atol=0.08)
+
+
+@pytest.mark.parametrize("turns", [0, 2])
+@pytest.mark.parametrize(("x_m", "along_deg"), [(2.0, 0.0), (18.0, 60.0), (40.0, 60.0)])
+def test_the_final_heading_is_that_against_the_path_beside_the_car_without_whole_turns(x_m, along_deg, turns):
+    run = straight(0.0, stops_m=x_m)
+    path_x_m, path_y_m = np.array([0.0, 10.0, 20.0]), np.array([0.0, 0.0, 10.0 * math.tan(math.radians(60.0))])
+    run.channels["yaw_rad"] = np.full_like(run.time_s, math.radians(50.0) + 2.0 * math.pi * turns)
+    assert math.degrees(heading_at_end(run, path_x_m, path_y_m)) == pytest.approx(50.0 - along_deg)
 
 
 def test_difference_of_two_tracks_is_lateral_at_the_same_x_and_within_the_gates():

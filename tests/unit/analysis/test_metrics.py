@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from activesteer.analysis import step_response
-from activesteer.analysis.metrics import EVALUATIONS, KEY_METRICS, general_metrics, metrics, weighted, weighting
+from activesteer.analysis.metrics import (
+    EVALUATIONS,
+    KEY_METRICS,
+    general_metrics,
+    label_of,
+    metrics,
+    weighted,
+    weighting,
+)
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ParameterError, RecordingError
 from activesteer.maneuver import KINDS
@@ -95,6 +103,13 @@ def test_wheels_of_a_side_that_are_lifted_together_count_as_two_wheel_lift():
     values = metrics(run)
     assert values["two_wheel_lift_time_s"] == pytest.approx(0.2, abs=1e-3)
     assert values["wheel_load_min_N"] == 0.0
+
+
+def test_a_metric_has_the_words_of_its_key_figure_and_others_on_a_path():
+    assert label_of("heading_end_rad", ["heading_end_rad"]) != label_of("heading_end_rad", ["track_deviation_max_m"])
+    for name in ("heading_end_rad", "track_deviation_max_m", "yaw_rate_peak_abs_radps"):
+        label = label_of(name, ["track_deviation_max_m", name])
+        assert label[:2].islower(), label
 
 
 def test_a_recording_without_kind_is_refused():

@@ -23,13 +23,38 @@ def test_times_of_the_steering_are_found(side):
     assert times.side == side
     assert times.begin_s == pytest.approx(SINE_BEGIN_S, abs=FILTER_S)
     # Between the halves there is no corner, so the filter moves nothing.
-    assert times.reversal_s == pytest.approx(REVERSAL_S, abs=0.001)
+    assert times.reversal_s == pytest.approx(REVERSAL_S, abs=1e-4)
     assert times.completion_s == pytest.approx(COMPLETION_S, abs=FILTER_S)
 
 
 @pytest.mark.parametrize("creep_s", [0.1, 0.3, 3.0])
 def test_a_wheel_that_creeps_to_the_centre_does_not_put_the_completion_off(creep_s):
     assert steering(sine_with_dwell(creep_s=creep_s)).completion_s == pytest.approx(COMPLETION_S, abs=FILTER_S)
+
+
+@pytest.mark.parametrize("creep_s", [0.0, 3.0])
+def test_times_lie_between_the_samples(creep_s):
+    fine = sine_with_dwell(creep_s=creep_s)
+    coarse = SyntheticRun(fine.time_s[::10], {name: values[::10] for name, values in fine.channels.items()})
+    found, expected = steering(coarse), steering(fine)
+    assert found.begin_s == pytest.approx(expected.begin_s, abs=1e-3)
+    assert found.reversal_s == pytest.approx(expected.reversal_s, abs=1e-4)
+    assert found.completion_s == pytest.approx(expected.completion_s, abs=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_car_that_does_not_turn_back_has_no_peak_after_the_reversal(side):
+    run = sine_with_dwell(side=side)
+    run.channels["yaw_rate_radps"] = side * np.interp(run.time_s, [SINE_BEGIN_S, 1.0, 6.0], [0.0, 0.5, 0.2])
+    values = metrics(run)
+    for name in ("yaw_rate_reversal_peak_radps", "yaw_rate_reversal_peak_time_s", "yaw_rate_after_1000ms_share"):
+        assert math.isnan(values[name])
+
+
+def test_the_final_heading_counts_from_the_first_one_with_all_turns():
+    run = sine_with_dwell()
+    run.channels["yaw_rad"] = np.interp(run.time_s, [0.0, 6.0], [0.3, -8.0])
+    assert metrics(run)["heading_end_rad"] == pytest.approx(-8.3)
 
 
 def test_begin_is_where_the_wheel_passes_five_degrees():

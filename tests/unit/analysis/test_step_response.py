@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from activesteer.analysis import step_response
-from activesteer.analysis.step_response import REFERENCE_MPS2, angle_at, step_response_metrics
+from activesteer.analysis.step_response import (
+    REFERENCE_MPS2,
+    angle_at,
+    follows_steering,
+    step_response_metrics,
+    without_response,
+)
 from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.errors import RecordingError
 from tests.raising import raises
@@ -77,6 +83,29 @@ def test_overshoot_grows_when_damping_falls():
         for damping in (0.4, 0.8)
     )
     assert loose > tight > 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("share", "follows"), [(0.11, True), (0.09, False), (-0.5, False)])
+def test_a_car_follows_the_steering_from_a_tenth_of_the_desired_yaw_rate(side, share, follows):
+    run = step_steer(side=side)
+    run.channels["yaw_rate_radps"] = share * run["yaw_rate_radps"]
+    assert follows_steering(run) is follows
+    shown = without_response(run, values := step_response_metrics(run))
+    hidden = {name for name in values if not math.isnan(values[name]) and math.isnan(shown[name])}
+    assert hidden == (
+        set()
+        if follows
+        else {
+            name
+            for name in values
+            if name.endswith(("_time_s", "_overshoot", "tb_srad"))
+            and name != "step_time_s"
+            and not math.isnan(values[name])
+        }
+    )
+    run.metadata["maneuver"]["kind"] = "open_loop"
+    assert follows_steering(run)
 
 
 def with_steering(values: np.ndarray, run: SyntheticRun) -> SyntheticRun:
