@@ -69,3 +69,11 @@ def test_aim_asks_for_the_search_of_the_step_steer():
 def test_wrong_values_are_answered_with_what_is_allowed(keys, key):
     with raises(ManeuverError, file="mine.toml", key=key):
         maneuver(**keys)
+
+
+def test_a_search_for_an_acceleration_begins_at_30_km_h():
+    aim = {"lateral_acceleration_mps2": 5.0}
+    with raises(ManeuverError, key="speed_kmh", value=pytest.approx(29.0)) as refused:
+        maneuver(turn=aim, speed_kmh=29.0)
+    assert refused.value.allowed.low == pytest.approx(30.0)
+    assert maneuver(turn=aim, speed_kmh=30.0).search is not None

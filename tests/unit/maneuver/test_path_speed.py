@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import activesteer
 from activesteer.analysis.path_following import path_following_metrics
 from activesteer.core.conventions import CORNERS
 from activesteer.errors import ManeuverError
@@ -60,6 +61,22 @@ def test_where_the_speed_falls_the_brake_is_pressed(tmp_path: Path) -> None:
     assert fast.brake_pedal > 0.2
     assert not fast.hold_speed
     assert (slow.brake_pedal, slow.hold_speed) == (0.0, True)
+
+
+@pytest.mark.parametrize("deceleration_mps2", [2.0, 5.0])
+def test_the_car_brakes_as_the_speed_of_the_path_falls(deceleration_mps2: float) -> None:
+    x = np.arange(0.0, 161.0, 4.0)
+    # 90 km/h for 40 m, then a constant deceleration to 36 km/h.
+    wanted = np.sqrt(np.maximum(25.0**2 - 2.0 * deceleration_mps2 * np.maximum(x - 40.0, 0.0), 10.0**2))
+    path = {"x_m": x.tolist(), "y_m": np.zeros_like(x).tolist(), "speed_kmh": (3.6 * wanted).tolist()}
+    table = {"kind": "follow_path", "speed_kmh": 90.0, "duration_s": 5.0, "settle_s": 0.5, "path": path}
+    run = activesteer.simulate(table)
+    behind = run["speed_mps"] - np.interp(run["x_m"], x, wanted)
+    assert np.abs(behind[run["x_m"] < 155.0]).max() < 1.0
+    # While it brakes evenly, the pedal alone gives the deceleration, and the excess of speed is little more than is left free.
+    even = (run["x_m"] > 60.0) & (run["speed_mps"] > 14.0)
+    assert run["ax_mps2"][even].mean() == pytest.approx(-deceleration_mps2, rel=0.05)
+    assert 0.3 < behind[even].mean() < 0.8
 
 
 def test_lap_time_and_overstep_of_a_car_beside_the_path(tmp_path: Path) -> None:

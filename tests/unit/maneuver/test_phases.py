@@ -56,6 +56,18 @@ def test_a_phase_ends_when_its_condition_holds(until, before, after) -> None:
     assert sequence.began[-1] == (0.6, "next")
 
 
+def test_a_phase_ends_at_its_time_though_its_condition_does_not_hold() -> None:
+    sequence = phases({**TURN, "until": {"y_above_m": 2.0, "time_s": 0.5}}, {"name": "next"})
+    assert angles(sequence, [0.4, 0.5, 0.9]) == pytest.approx([36.0, 45.0, 45.0])
+    assert sequence.began[-1] == (0.5, "next")
+
+
+def test_a_car_that_stands_at_the_start_settles_with_the_brake_of_its_first_phase() -> None:
+    for speed_kmh, pedal in ((0.0, 0.4), (72.0, 0.0)):
+        sequence = phases({"name": "hold", "brake_pedal": 0.4, "brake_time_s": 0.2}, speed_kmh=speed_kmh)
+        assert sequence.maneuver.settling_setpoint().brake_pedal == pedal
+
+
 def test_to_the_right_angles_and_conditions_are_mirrored() -> None:
     end = {**TURN, "until": {"yaw_rate_above_degps": 10.0}}
     sequence = phases(end, {"name": "next"}, direction="right")

@@ -44,6 +44,7 @@ def test_path_comes_from_the_row_and_leaves_straight_beside_it():
     course = slalom({"entry_m": 60.0}).course
     path = course.path
     crest = 1.15 * (math.pi / 36.0) ** 2
+    assert (path.x_m[0], path.y_m[0]) == pytest.approx((0.0, 0.0), abs=1e-9)
     straight = path.x_m < 60.0 - 36.5
     assert np.abs(path.y_m[straight]).max() < 1e-3
     entry = (path.x_m > 24.0) & (path.x_m < 60.0)
