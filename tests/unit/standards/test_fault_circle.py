@@ -47,10 +47,18 @@ def test_the_tolerated_time_keeps_the_limits_and_a_little_more_breaks_them(made)
     assert 0.0 < tolerant_s < 0.1
     good = activesteer.simulate(circle("left"), "ars")
 
+    def broken(until: str = "") -> activesteer.Recording:
+        return activesteer.simulate(circle("left"), "ars", overrides={"fault": f"rear:runaway=left@{BEGIN_S}{until}"})
+
+    run, then = broken(), round((BEGIN_S + 1.0) * 1000.0) - 1
+    x, y = (run[name][then] - good[name][then] for name in ("x_m", "y_m"))
+    yaw = good["yaw_rad"][then]
+    aside = math.cos(yaw) * y - math.sin(yaw) * x
+    assert made["rear:runaway=left", "left"]["lateral_offset_1s_driver_m"] == pytest.approx(aside, abs=1e-9)
+
     def used(length_s: float) -> float:
         """Return the largest proportion of a limit."""
-        fault = f"rear:runaway=left@{BEGIN_S}-{BEGIN_S + length_s}"
-        run = activesteer.simulate(circle("left"), "ars", overrides={"fault": fault})
+        run = broken(f"-{BEGIN_S + length_s}")
         # The driver, who answers here, has done nothing yet when the peak comes.
         yaw_rate, ay = (np.abs(run[name] - good[name]).max() for name in ("yaw_rate_radps", "ay_mps2"))
         return max(yaw_rate / YAW_RATE_RADPS, ay / AY_MPS2)
