@@ -58,6 +58,9 @@ class Room(NamedTuple):
 
 
 _STUDIES: Final = "design factor_values factors plan run_identity dependence report workers study_file"
+_METRICS: Final = (
+    "braking frequency_response handling lanes metrics path_following series sine_with_dwell step_response"
+)
 ROOMS: Final = {
     "controllers": Room(
         "controllers/*.py",
@@ -108,6 +111,42 @@ ROOMS: Final = {
     "analysis/harm": Room("analysis/harm.py", "unit/analysis/test_harm.py", "physics/test_harm.py"),
     "measured/comparison": Room(
         "measured/comparison.py", "unit/measured/test_comparison.py", "cli/test_measured.py unit/measured"
+    ),
+    "analysis": Room(
+        " ".join(f"analysis/{name}.py" for name in _METRICS.split()),
+        " ".join(f"unit/analysis/test_{name}.py" for name in _METRICS.split()),
+        "unit/analysis/test_report.py unit/analysis/test_figures.py unit/maneuver/test_path_speed.py unit/standards "
+        "physics/test_electric_power.py physics/test_uneven_road.py",
+    ),
+    "maneuver": Room(
+        "maneuver/*.py",
+        "unit/maneuver",
+        "unit/scenario unit/road physics/test_step_steer.py physics/test_standstill.py physics/test_parking.py",
+    ),
+    "theory": Room("theory/*.py", "unit/theory", "physics/test_single_track.py unit/controllers"),
+    "standards": Room("standards/*.py", "unit/standards"),
+    "rigs": Room("rigs/kc/*.py", "unit/rigs/test_kc.py", "physics/test_kinematics_compliance.py unit/vehicle_builder"),
+    "vehicle": Room(
+        "vehicle/[!n]*.py vehicle/channels/*.py",
+        "unit/vehicle physics/test_toe_link_screw.py physics/test_step_steer.py",
+        "physics/test_symmetry.py physics/test_balance.py physics/test_signs.py physics/test_electric_power.py "
+        "physics/test_superposition_actuator.py physics/test_static_ride.py physics/test_loaded_car.py "
+        "unit/vehicle_builder unit/scenario unit/recording",
+    ),
+    "measured": Room("measured/*.py", "unit/measured", "cli/test_measured.py cli/test_measured_folder.py"),
+    "studies/linear": Room(
+        "studies/linear/*.py",
+        "unit/studies/linear",
+        "physics/test_linearisation.py physics/test_identification.py physics/test_driver_loop.py",
+    ),
+    "learning": Room("learning/*.py", "unit/learning"),
+    "recording": Room(
+        "recording/*.py", "unit/recording", "unit/simulation/test_recorder.py unit/playback/test_file.py"
+    ),
+    "scenario": Room(
+        "scenario/*.py config/*.py core/units.py core/limits.py core/metric_table.py",
+        "unit/test_config.py unit/test_units.py unit/test_metric_table.py unit/scenario",
+        "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording",
     ),
 }
 

@@ -20,6 +20,8 @@ REAR: Final = 0.005
 """Gradients of roll angle and rear slip angle [rad/(m/s2)]."""
 LIMIT_MPS2: Final = 7.0
 """Lateral acceleration at which the car stays."""
+BRAKED_MPS2: Final = 10.0
+"""Deceleration at full pedal."""
 FRICTION_Nm: Final = 1.5
 TORQUE_NmPMPS2: Final = 0.8
 """Hand torque: friction, and what it rises by over lateral acceleration."""
@@ -59,6 +61,8 @@ class LinearCarRunner(PrescribedRunner):
         time_s = times(maneuver.duration_s)
         setpoints = [maneuver.setpoint(time) for time in time_s.tolist()]
         speed = np.array([setpoint.speed_demand_mps for setpoint in setpoints])
+        braked = [BRAKED_MPS2 * setpoint.brake_pedal for setpoint in setpoints]
+        speed = np.maximum(speed - np.cumsum(braked) * (time_s[1] - time_s[0]), 1.0)
         if setpoints[0].curvature_demand_1pm is not None:
             curvature = np.array([setpoint.curvature_demand_1pm for setpoint in setpoints])
             steer = (self.wheelbase_m + EG * speed**2) * curvature

@@ -91,6 +91,12 @@ def test_iso_7975_brakes_on_a_circle_of_100_m_from_gentle_to_nearly_full():
         assert wheel_deg(each, [each.brake.start_s]) == pytest.approx([sign * found.values["steering_wheel_deg"]])
         # The second after the start of braking is evaluated.
         assert each.duration_s >= each.brake.start_s + 1.0
+    hardest = next(picture for picture in found.pictures if picture.title == "Hardest braking")
+    speeds = next(panel for panel in hardest.panels if panel.y_label.startswith("speed"))
+    assert [curve.label for curve in speeds.curves] == ["left, pedal 0.60", "right, pedal 0.60"]
+    for curve in speeds.curves:
+        one_second_later = float(np.interp(1.0, curve.x, curve.y))
+        assert one_second_later / 3.6 == pytest.approx(speed_mps - 6.0, abs=0.7)
     assert "-3.0 deg/s" in found.summary
     assert "runs wide" in found.summary
     assert "6.5 m/s²" in found.summary
