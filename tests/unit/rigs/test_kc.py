@@ -14,10 +14,11 @@ from activesteer.errors import ParameterError
 from activesteer.plotting import Panel
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import draw, kinematics_compliance
-from activesteer.rigs.kc.figures import _targets
+from activesteer.rigs.kc.figures import _steering, _targets
 from activesteer.rigs.kc.held_car import WheelPose
 from activesteer.rigs.kc.metrics import DEFINITIONS, FORMULAS, load_targets
 from activesteer.rigs.kc.programme import steering_axis
+from activesteer.rigs.kc.result import write_tables
 from tests.bench import on_the_bench
 from tests.raising import raises
 
@@ -174,6 +175,52 @@ def test_a_steering_axis_is_found_from_two_poses(side: float) -> None:
     assert axis.scrub_radius_m == pytest.approx(0.06)
     assert axis.centre_trail_m == pytest.approx(0.03 - 0.3 * math.tan(0.12))
     assert axis.centre_offset_m == pytest.approx(0.05 + 0.3 * math.tan(0.2))
+
+
+@pytest.mark.parametrize("axle", ["front", "rear"])
+def test_the_tables_have_the_slopes_of_the_metrics(axle: str, tmp_path: Path) -> None:
+    result = on_the_bench()
+    write_tables(result, tmp_path)
+    with (tmp_path / f"{axle}_parallel_travel.csv").open() as file:
+        file.readline()
+        heads = [head.partition(" ")[0] for head in file.readline().strip().split(",")]
+        columns = dict(zip(heads, np.loadtxt(file, delimiter=",").T, strict=True))
+    near = np.abs(columns["left_travel"]) < 15.001
+
+    def slope(channel: str, side: str) -> float:
+        """Return the slope within 15 mm, per mm or in deg/mm."""
+        travel, values = (columns[f"{side}_{name}"][near] for name in ("travel", channel))
+        return float(np.polynomial.Polynomial.fit(travel, values, 1).convert().coef[1])
+
+    for channel, name, factor in (
+        ("toe", "bump_steer", 1e3), ("camber", "bump_camber", 1e3), ("load", "wheel_rate", 1.0),
+        ("centre_forward", "wheel_recession", -1e3), ("contact_outwards", "track_change", 2e3),
+    ):  # fmt: skip
+        both = [factor * slope(channel, side) for side in ("left", "right")]
+        assert np.mean(both) == pytest.approx(result[axle, name], rel=0.01, abs=0.01), name
+        assert both[0] == pytest.approx(both[1], rel=0.02, abs=0.02), name
+    assert abs(np.mean([slope("damper", side) for side in ("left", "right")])) == pytest.approx(
+        result[axle, "damper_ratio"], rel=0.01
+    )
+    # A knuckle that turns forwards, against its caster, moves the contact point backwards.
+    sweep = result.curves["parallel_travel"]
+    for wheel, side in enumerate(("left", "right"), 0 if axle == "front" else 2):
+        below_m = sweep.patch_m[:, wheel] - sweep.centre_m[:, wheel]
+        backwards = (below_m[sweep.zero, 0] - below_m[:, 0]) / -below_m[:, 2]
+        assert np.radians(columns[f"{side}_caster"]) == pytest.approx(-backwards, rel=0.01, abs=1e-3)
+
+
+def test_the_figure_of_the_steering_has_the_ackermann_percentage_of_the_metric() -> None:
+    angles, _, ackermann, _ = _steering(on_the_bench()).panels
+    assert isinstance(ackermann, Panel)
+    own, ideal = (float(np.interp(20.0, curve.x, curve.y)) for curve in ackermann.curves)
+    assert 100.0 * own / ideal == pytest.approx(on_the_bench()["front", "ackermann"], rel=0.01)
+    assert isinstance(angles, Panel)
+    left, right = angles.curves[:2]
+    # The car is symmetric, so that the right wheel turns to the right as the left wheel does to the left.
+    assert left.y == pytest.approx(-right.y[::-1], abs=0.01)
+    assert left.y[-1] == pytest.approx(on_the_bench()["front", "greatest_inner_angle"], rel=0.01)
+    assert left.y[0] == pytest.approx(-on_the_bench()["front", "greatest_outer_angle"], rel=0.01)
 
 
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
