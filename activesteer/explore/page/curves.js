@@ -2,7 +2,7 @@
 import { element, number, onTheme, paint, runColour, slippery } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const HEIGHT = 170, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
+const HEIGHT = 170, HEAD = 36, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
@@ -17,7 +17,8 @@ export class Curves {
     this.pointed = pointed;
     this.zoomed = zoomed;
     this.plots = new Map();
-    new ResizeObserver(() => { for (const { plot, holder } of this.plots.values()) plot.setSize({ width: holder.clientWidth, height: HEIGHT }); }).observe(box);
+    this.tall = { count: 0, height: HEIGHT };
+    new ResizeObserver(() => this.fit()).observe(box);
     onTheme(() => this.draw());
   }
 
@@ -61,11 +62,21 @@ export class Curves {
     this.again();
   }
 
-  // Let another part of the grid be as high as some rows of curves.
-  besides(part) {
-    const row = HEIGHT + 36, columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length;
-    part.style.gridRow = columns > 1 ? `span ${3 * Math.max(1, Math.round(part.firstElementChild.offsetHeight / row))}` : "";
+  // Let a table be as high as some rows of curves, and the curves beside it as high as the table.
+  besides(table) {
+    this.table = table;
+    this.fit();
   }
+
+  fit() {
+    const columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length, high = this.table?.firstElementChild.offsetHeight ?? 0;
+    const rows = Math.max(1, Math.round(high / (HEIGHT + HEAD)));
+    if (this.table) this.table.style.gridRow = columns > 1 ? `span ${3 * rows}` : "";
+    this.tall = { count: columns > 1 && high ? rows * (columns - 1) : 0, height: Math.max(HEIGHT, Math.floor(high / rows) - HEAD) };
+    [...this.plots.values()].forEach(({ plot, holder }, i) => plot.setSize({ width: holder.clientWidth, height: this.height(i) }));
+  }
+
+  height(place) { return place < this.tall.count ? this.tall.height : HEIGHT; }
 
   // New curves have their scales in the next frame.
   again() { requestAnimationFrame(() => { if (this.time != null) this.at(this.time); }); }
@@ -192,7 +203,7 @@ export class Curves {
     shown.key = key;
     const axis = (size, unit = "") => ({ values: (_, ticks) => ticks.map((tick) => (tick == null ? "" : `${+tick.toPrecision(9)}`.replace("-", "−") + unit)), stroke: () => paint("quiet"), font: FONT, size, gap: 4, grid: { stroke: () => paint("grid"), width: 1 }, ticks: { show: false } });
     shown.plot = new uPlot({
-      width: shown.holder.clientWidth || 380, height: HEIGHT, legend: { show: false }, padding: [6, 14, 0, 0],
+      width: shown.holder.clientWidth || 380, height: this.height([...this.plots.keys()].indexOf(title)), legend: { show: false }, padding: [6, 14, 0, 0],
       cursor: { y: false, sync: { key: "explore", scales: ["x", null] }, drag: { x: true, y: false } },
       scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, panel.min_span) } },
       axes: [{ ...axis(30, " s"), gap: 8 }, axis(50)],
