@@ -11,9 +11,13 @@ from activesteer.analysis import step_response
 from activesteer.analysis.metrics import (
     EVALUATIONS,
     KEY_METRICS,
+    SEAT_ASIDE_M,
+    energy_metrics,
     general_metrics,
     label_of,
     metrics,
+    ride_metrics,
+    seat_acceleration_mps2,
     weighted,
     weighting,
 )
@@ -136,3 +140,91 @@ def test_a_sine_keeps_its_shape_and_its_mean_does_not_count() -> None:
     time = np.arange(0.0, 10.0, 1e-3)
     wave = 3.0 + 2.0 * np.sin(2.0 * math.pi * 4.0 * time)
     assert np.sqrt(np.mean(weighted(wave, 1e-3) ** 2)) == pytest.approx(0.967 * math.sqrt(2.0), rel=1e-3)
+
+
+SINE_RADPS = 2.0 * math.pi * 4.0
+"""A frequency that the weighting leaves nearly as it is."""
+LEFT_AHEAD_M = 1.1
+
+
+def shaken(**channels: np.ndarray) -> SyntheticRun:
+    """Return a car of 2.6 m wheelbase, its front axle 1.1 m ahead of its centre of gravity, with some channels."""
+    time_s = np.arange(0.0, 10.0, 1e-3)
+    zero = np.zeros_like(time_s)
+    names = ("az_mps2", "pitch_rate_radps", "roll_rate_radps", "x_m", "y_m", "front_axle_y_m")
+    known = dict.fromkeys(names, zero) | {"front_axle_x_m": zero + LEFT_AHEAD_M}
+    for corner in CORNERS:
+        known |= {f"{corner}_tyre_fz_N": zero + 4000.0, f"{corner}_travel_m": zero}
+        known |= {f"{corner}_contact_{axis}_m": zero for axis in "xy"}
+    run = SyntheticRun(time_s, known | channels)
+    run.metadata["car"] = {"wheelbase_m": 2.6}
+    return run
+
+
+def test_the_seat_is_in_the_middle_of_the_wheelbase_on_the_side_that_is_worse() -> None:
+    sine, cosine = (function(SINE_RADPS * np.arange(0.0, 10.0, 1e-3)) for function in (np.sin, np.cos))
+    gain = 0.967 * math.sqrt(0.5)
+    heave = seat_acceleration_mps2(shaken(az_mps2=2.0 * sine))
+    assert heave == pytest.approx(2.0 * gain, rel=2e-3)
+    # The middle of the wheelbase is 0.2 m behind the centre of gravity: it rises as the nose falls.
+    pitch = 0.1 * SINE_RADPS
+    assert seat_acceleration_mps2(shaken(pitch_rate_radps=0.1 * cosine)) == pytest.approx(0.2 * pitch * gain, rel=5e-3)
+    together = shaken(az_mps2=2.0 * sine, pitch_rate_radps=-0.1 * cosine)
+    assert seat_acceleration_mps2(together) == pytest.approx((2.0 + 0.2 * pitch) * gain, rel=5e-3)
+    for side in (1.0, -1.0):
+        rolling = shaken(az_mps2=2.0 * sine, roll_rate_radps=-side * 0.1 * cosine)
+        expected = (2.0 + SEAT_ASIDE_M * 0.1 * SINE_RADPS) * gain
+        assert seat_acceleration_mps2(rolling) == pytest.approx(expected, rel=5e-3)
+
+
+def test_the_wheel_that_is_worst_counts_on_an_uneven_road() -> None:
+    time_s = np.arange(0.0, 10.0, 1e-3)
+    run = shaken(
+        rl_tyre_fz_N=4000.0 + 1000.0 * np.sin(SINE_RADPS * time_s),
+        fr_tyre_fz_N=np.where(time_s < 1.0, 0.0, 4000.0),
+        rr_travel_m=0.03 * np.sin(SINE_RADPS * time_s) - 0.05,
+    )
+    values = ride_metrics(run)
+    assert values["suspension_travel_max_m"] == pytest.approx(0.06, rel=1e-3)
+    assert values["wheel_lift_share"] == pytest.approx(0.1)
+    # A load of 4 kN that is away for a tenth of the time: deviation 0.3 of it, mean 0.9 of it.
+    assert values["wheel_load_coefficient_max"] == pytest.approx(0.3 / 0.9, rel=1e-3)
+    run.channels["fr_tyre_fz_N"] = np.full_like(time_s, 4000.0)
+    assert ride_metrics(run)["wheel_load_coefficient_max"] == pytest.approx(0.25 * math.sqrt(0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rear", "superposition", "steering_W"),
+    [
+        # Both hinges of 10 Nm at 0.1 rad/s; the superposition turns the steering wheel 16 times as far as the wheels.
+        ({"preset": "hinge"}, {"preset": "servo"}, 2.0 * 10.0 * 0.1 + 2.0 * 16.0 * 0.01),
+        ({"preset": "screw_3deg"}, {"preset": "servo"}, 2.0 * 0.5 * 40.0 + 2.0 * 16.0 * 0.01),
+        ({"preset": "screw_3deg", "arrangement": "central"}, {"preset": "harmonic"}, 0.7 * 30.0 + 0.2 * 50.0),
+        ({"preset": "screw_10deg"}, {"preset": "harmonic"}, 0.7 * 30.0 + 0.2 * 50.0),
+    ],
+)
+def test_energies_are_those_of_battery_brakes_and_steering_actuators(rear, superposition, steering_W) -> None:
+    time_s = np.arange(0.0, 4.0005, 0.001)
+    # Actuators move for two seconds, and are driven back in the next two: that energy is not regained.
+    back = np.where(time_s < 2.0, 1.0, -1.0)
+    ones = np.ones_like(time_s)
+    channels = {
+        "battery_energy_J": 5e4 + 100.0 * time_s, "rear_steer_rad": 0.1 * time_s, "superposition_rad": 0.01 * time_s,
+        "superposition_torque_Nm": 2.0 * back,
+        "rear_motor_torque_Nm": 0.7 * back, "rear_motor_speed_radps": 30.0 * ones,
+        "superposition_motor_torque_Nm": 0.2 * back, "superposition_motor_speed_radps": 50.0 * ones,
+    }  # fmt: skip
+    for corner in CORNERS:
+        channels |= {f"{corner}_brake_torque_Nm": -200.0 * ones, f"{corner}_wheel_speed_radps": 50.0 * ones}
+        channels |= {f"{corner}_steer_torque_Nm": 10.0 * back, f"{corner}_motor_torque_Nm": 0.5 * back}
+        channels |= {f"{corner}_motor_speed_radps": 40.0 * ones}
+    run = SyntheticRun(time_s, channels)
+    assert energy_metrics(run) == {}
+    run.metadata["vehicle"] = {
+        "motors": {"rl": {}}, "steering": {"ratio": 16.0}, "rear_actuator": rear,
+        "superposition_actuator": superposition,
+    }  # fmt: skip
+    values = energy_metrics(run)
+    assert values["battery_energy_J"] == pytest.approx(400.0)
+    assert values["brake_energy_J"] == pytest.approx(4.0 * 200.0 * 50.0 * 4.0, rel=1e-6)
+    assert values["steering_energy_J"] == pytest.approx(2.0 * steering_W, rel=2e-3)
