@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from activesteer.analysis.lanes import (
+    TIME_TOLERANCE_S,
     cone_distances,
+    corridor,
     first_at,
     heading_at_end,
     lane_overstep,
     largest_difference,
     path_distance,
     places_along,
+    struck_cones,
     track_over_x,
+    view_of,
 )
 from activesteer.analysis.path_following import path_following_metrics
 from activesteer.analysis.source import read_course, read_footprint
@@ -200,3 +204,32 @@ def test_a_car_that_turns_back_counts_where_it_was_first():
     run.channels["front_axle_y_m"] = np.where(run.time_s < 2.0, 0.0, 3.0)
     run.channels["front_axle_x_m"] = np.where(run.time_s < 2.0, x, 2.0 * x[2000] - x)
     np.testing.assert_allclose(track_over_x(run, np.array([10.0, 30.0, 39.0])), 0.0)
+
+
+def test_the_corridor_of_a_ramp_is_wider_by_its_tolerances_in_time_and_size():
+    time_s = np.arange(0.0, 1.0, 0.001)
+    inside = slice(50, -50)
+    for slope in (3.0, -3.0):
+        low, high = corridor(time_s, slope * time_s, 0.1)
+        np.testing.assert_allclose((slope * time_s - low)[inside], 3.0 * TIME_TOLERANCE_S + 0.1, atol=1e-9)
+        np.testing.assert_allclose((high - slope * time_s)[inside], 3.0 * TIME_TOLERANCE_S + 0.1, atol=1e-9)
+
+
+def test_a_cone_is_struck_if_any_of_the_cars_hits_it():
+    cones = ((50.0, 0.0), (70.0, 3.0), (90.0, -6.0))
+    middle, left = (straight(y_m, lanes=(), cones=cones) for y_m in (0.0, 3.0))
+    nowhere = straight(0.0, lanes=(), cones=cones)
+    del nowhere.metadata["car"]
+    assert struck_cones([middle, nowhere], read_course(middle)).tolist() == [True, False, False]
+    assert struck_cones([middle, left], read_course(middle)).tolist() == [True, True, False]
+
+
+def test_a_course_is_shown_with_road_before_and_behind_its_gates_and_beside_it():
+    course = read_course(along_path())
+    view = view_of(course)
+    assert view.x_m == (30.0 - 20.0, 155.0 + 50.0)
+    assert view.y_m == (-1.7 - 2.0, 5.1 + 2.0)
+    assert view.path_x_m[-1] == pytest.approx(course.path.x_m[-1] + 195.0)
+    free = view_of(read_course(along_path(last_gate_m=None, lanes=(), path=lambda x: 0.01 * x)))
+    assert free.x_m == (-2.0, pytest.approx(299.5 + 2.0))
+    assert free.y_m == (-2.0, pytest.approx(2.995 + 2.0))
