@@ -47,7 +47,7 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
     if form is None:
         hint = nearest_names(text, kind.names())
         raise kind.error(
-            f"there is no {kind.word} {shown(text)}; {hint} Give your own as {kind.example}",
+            f"there is no {kind.word} {shown(text)}; {hint} (give your own as {kind.example})",
             value=text,
             allowed=tuple(kind.names()),
         )
