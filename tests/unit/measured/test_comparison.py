@@ -88,6 +88,14 @@ def test_the_interval_of_a_mean_is_two_sided():
     np.testing.assert_allclose(found.confidence, 12.706 * 0.01, rtol=1e-4)
 
 
+def test_runs_that_are_not_aligned_are_compared_by_their_own_clocks():
+    late = [run(ay_mps2=step(TIME_S, 2.5))]
+    found = plain(late, run(ay_mps2=step(TIME_S)), aligned=False)
+    assert found.shifts_s == (0.0,)
+    assert found.quantities[0].share_inside == pytest.approx(1.0 - 0.5 / 5.0, abs=0.05)
+    assert not found.inside
+
+
 def test_cross_plots_know_no_time():
     ay = np.linspace(0.0, 8.0, len(TIME_S))
     slower = ay**3 / 64.0
