@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from activesteer.errors import ParameterError, PlaybackError
 from activesteer.learning import TASKS, CarEnv, CarVectorEnv, normalised
+from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
 from tests.raising import raises
 
 SHORT = {"overrides": {"settle_s": 0.2, "duration_s": 0.8}, "interval_s": 0.1}
@@ -116,6 +117,51 @@ def test_the_reward_is_the_sum_of_its_terms_and_ends_have_reasons() -> None:
     else:
         pytest.fail("the episode has no end")
     assert info["end"] in ("lost", "off course", "stopped")
+
+
+@pytest.mark.parametrize("task", ["SplitMuBraking", "Drift"])
+def test_the_terms_of_the_reward_are_those_of_the_recorded_motion(task: str) -> None:
+    short = {"duration_s": 2.0, "brake.start_s": 0.3} if task == "SplitMuBraking" else {"duration_s": 2.0}
+    env = CarEnv(task, interval_s=0.1, overrides={"settle_s": 0.5, **short})
+    env.reset(seed=1)
+    env.action_space.seed(1)
+    actions, terms = [], []
+    for _ in range(15):
+        # An agent who drives steers to the left and accelerates.
+        actions.append(np.array([0.2, 0.3, 0.0]) if task == "Drift" else env.action_space.sample())
+        terms.append(env.step(actions[-1].astype(np.float32))[4]["reward_terms"])
+    run, rows = env.recording(), 100 * np.arange(1, 16) - 1
+
+    def at(name: str) -> np.ndarray:
+        return run[name][rows]
+
+    sideslip = np.arctan2(at("vy_mps"), at("vx_mps"))
+    mean_square = np.mean(np.square(actions), axis=1)
+    if task == "Drift":
+        offset = 25.0 - np.hypot(at("x_m"), 25.0 - at("y_m"))
+        drift = (sideslip + math.radians(25.0)) / math.radians(10.0)
+        expected = {
+            "drift": np.exp(-(drift**2)), "circle": np.exp(-((offset / 3.0) ** 2)), "effort": -0.02 * mean_square,
+        }  # fmt: skip
+    else:
+        # The wheel is held nearly straight, so that the desired yaw rate is far below its limit. The accelerometer
+        # pitches with the body, nose down, and shows a part of gravity.
+        braking = -(at("ax_mps2") / 9.80665 - np.sin(at("pitch_rad")))
+        config = env.episodes.loop(0).controller_setup.single_track
+        gain = yaw_rate_gain(SingleTrack(config), at("vx_mps"))
+        demand = at("front_steer_demand_rad")
+        expected = {
+            "sideslip": -((sideslip / math.radians(5.0)) ** 2), "effort": -0.02 * mean_square,
+            "offset": -(at("y_m") ** 2), "braking": 0.5 * braking,
+            "yaw_rate": -(((at("yaw_rate_radps") - gain * demand) / math.radians(10.0)) ** 2),
+        }  # fmt: skip
+        assert expected["braking"][-1] > 0.1
+    for name, values in expected.items():
+        found = np.array([each[name] for each in terms])
+        # The steering demand in a row is a step older than the motion.
+        within = 0.1 if name == "yaw_rate" else 5e-3
+        assert found == pytest.approx(0.1 * values, rel=within, abs=2e-5), name
+        assert np.ptp(found) > 0.0 or name == "effort"
 
 
 def test_observations_are_normalised_on_request() -> None:
