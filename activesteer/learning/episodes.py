@@ -133,6 +133,9 @@ _ROAD: Final = (
 _DISTANCES_M, _DISTANCES_S = np.array([0.0, 0.1, *(0.0 for _ in _AHEAD_S)]), np.array([0.0, 0.0, *_AHEAD_S])
 """Points of the path in an observation: distances [m], and times at the current speed [s]."""
 _WINDOW_M: Final = 5.0
+"""Least distance to either side of a car's last place on its path in which the car is searched [m]."""
+_FASTEST_MPS: Final = 70.0
+"""Speed up to which a car is found on its path after any interval [m/s]."""
 _ENDS: Final = ("", "time", "off course", "lost", "stopped", "diverged")
 _END_NAMES: Final = np.array(_ENDS, dtype=object)
 _SIDESLIP_RAD, _RATE_RADPS, _OFFSET_M = math.radians(5.0), math.radians(10.0), 1.0
@@ -351,7 +354,8 @@ class Episodes:
             px, py = radius * np.sin(around), radius - radius * np.cos(around)
         else:
             assert self._paths is not None  # the task has a path
-            found = self._paths.ahead(cars, x, y, self._along_m[cars], _WINDOW_M, distances)
+            window_m = max(_WINDOW_M, self.interval_s * _FASTEST_MPS)
+            found = self._paths.ahead(cars, x, y, self._along_m[cars], window_m, distances)
             self._along_m[cars], px, py = found
         heading = np.arctan2(py[:, 1] - py[:, 0], px[:, 1] - px[:, 0])
         offset = np.cos(heading) * (y - py[:, 0]) - np.sin(heading) * (x - px[:, 0])

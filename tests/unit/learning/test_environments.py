@@ -10,6 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
+from activesteer.analysis.lanes import path_distance
 from activesteer.errors import ParameterError, PlaybackError
 from activesteer.learning import TASKS, CarEnv, CarVectorEnv, normalised
 from activesteer.theory.single_track import SingleTrack, yaw_rate_gain
@@ -162,6 +163,17 @@ def test_the_terms_of_the_reward_are_those_of_the_recorded_motion(task: str) -> 
         within = 0.1 if name == "yaw_rate" else 5e-3
         assert found == pytest.approx(0.1 * values, rel=within, abs=2e-5), name
         assert np.ptp(found) > 0.0 or name == "effort"
+
+
+def test_the_offset_is_the_distance_from_the_path() -> None:
+    env = CarEnv("Slalom", interval_s=0.2, overrides={"settle_s": 0.5})
+    env.reset(seed=1)
+    offsets = [env.step(np.zeros(1, np.float32))[4]["reward_terms"]["offset"] for _ in range(25)]
+    run, rows = env.recording(), 200 * np.arange(1, 26) - 1
+    path = env.episodes.loop(0).maneuver.course.path
+    distance = path_distance(run["x_m"][rows], run["y_m"][rows], path.x_m, path.y_m)
+    assert np.abs(distance).max() > 0.2
+    assert offsets == pytest.approx(-0.2 * distance**2, rel=0.05, abs=1e-4)
 
 
 def test_observations_are_normalised_on_request() -> None:
