@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -163,7 +164,11 @@ class Fault:
         if needed is None:
             return f"{self.part}:{self.kind}"
         value, unit = getattr(self, needed), needed.rpartition("_")[2]
-        return f"{self.part}:{self.kind}={value}" if needed == "side" else f"{self.part}:{self.kind}={value:g}{unit}"
+        if needed == "side":
+            return f"{self.part}:{self.kind}={value}"
+        if unit.startswith("rad"):
+            value, unit = math.degrees(value), unit.replace("rad", "deg")
+        return f"{self.part}:{self.kind}={value:g}{unit}"
 
     def name_at(self, now_s: float) -> str:
         """Return the name with its time, except for a fault that starts now and has no end."""

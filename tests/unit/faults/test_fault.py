@@ -98,5 +98,19 @@ def test_one_part_has_one_fault_at_a_time() -> None:
     assert len(faults_of(stuck, fault_table("rear_left:float@2"), fault_table("superposition:stuck@1"))) == 2 + 1
 
 
+@pytest.mark.parametrize(
+    ("text", "now_s", "name"),
+    [
+        ("rear:stuck@1", 1.0, "rear:stuck"),
+        ("rear:stuck@1", 0.5, "rear:stuck@1"),
+        ("rear:offset=1deg@1-2", 1.0, "rear:offset=1deg@1-2"),
+        ("rear:delayed=0.1s@1.5", 2.0, "rear:delayed=0.1s"),
+    ],
+)
+def test_a_name_has_its_time_unless_it_begins_now_and_has_no_end(text: str, now_s: float, name: str) -> None:
+    [fault] = faults_of(fault_table(text))
+    assert fault.name_at(now_s) == name
+
+
 def test_every_kind_says_what_it_does() -> None:
     assert all("actuator" in words or "demand" in words for words in KINDS.values())

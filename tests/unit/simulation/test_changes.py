@@ -24,15 +24,17 @@ class Follows:
 
     derived = ("squared",)
 
-    def __init__(self, gain_s: float = 0.1) -> None:
+    def __init__(self, gain_s: float = 0.1, sign: float = 1.0) -> None:
         self.gain_s = gain_s
+        self.sign = sign
         self.filtered = 0.0
         self.squared: float | None = None
 
     def step(self, command, measurement):
         self.squared = self.gain_s**2 if self.squared is None else self.squared
         self.filtered += 0.01 * (measurement.yaw_rate_radps - self.filtered)
-        return ActuatorCommand(rear_steer_demand_rad=self.gain_s * self.filtered, correction_rad=self.squared)
+        demand_rad = self.sign * self.gain_s * self.filtered
+        return ActuatorCommand(rear_steer_demand_rad=demand_rad, correction_rad=self.squared)
 
 
 def step_steer(controller: object = "none", **more: object) -> Simulation:
@@ -88,6 +90,16 @@ def test_a_user_s_controller_keeps_its_memory_and_gets_new_parameters() -> None:
     assert recording["correction_rad"][[799, 801]] == pytest.approx([0.01, 0.04])
 
 
+def test_a_second_parameter_of_a_user_s_controller_leaves_the_first_as_it_was_set() -> None:
+    simulation = step_steer(Follows)
+    simulation.advance(800)
+    simulation.set("controllers.Follows.gain_s", 0.2)
+    simulation.set("controllers.Follows.sign", -1.0)
+    simulation.run()
+    before, after = simulation.recording()["rear_steer_demand_rad"][[799, 801]]
+    assert after == pytest.approx(-2.0 * before, rel=0.01)
+
+
 def test_speed_changes_and_a_driver_stays_on_his_path() -> None:
     simulation = Simulation("double_lane_change", overrides={"settle_s": 0.3})
     simulation.advance(300)
@@ -128,7 +140,7 @@ def test_a_fault_acts_beside_an_earlier_one_which_goes_on() -> None:
     recording = simulation.recording()
     assert recording["active_faults"][[499, 501, 750, 950]].tolist() == [0, 1, 2, 1]
     assert [event["what"] for event in recording.metadata["events"]] == [
-        "rl_brake:stuck", "rear:offset=0.0174533rad@0.7-0.9",
+        "rl_brake:stuck", "rear:offset=1deg@0.7-0.9",
     ]  # fmt: skip
     with raises(ManeuverError, key="fault.1"):
         again = step_steer()
