@@ -50,7 +50,7 @@ def test_what_is_no_fault_is_said_with_the_form(text: str) -> None:
 def test_a_unit_of_the_edge_fills_the_si_field() -> None:
     (fault,) = faults_of(fault_table("yaw_rate_sensor:offset=90degps@1"))
     assert fault.size_radps == pytest.approx(1.5708, abs=1e-4)
-    assert fault.name == "yaw_rate_sensor:offset=1.5708radps"
+    assert fault.name == "yaw_rate_sensor:offset=90degps"
 
 
 @pytest.mark.parametrize("part", SENSORS)
