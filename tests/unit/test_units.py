@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from activesteer.core.metric_table import METRICS
-from activesteer.core.units import parameter_title, quantity_of, three_digits, typeset
+from activesteer.core.units import (
+    UNIT_NAMES,
+    alike,
+    find_unit,
+    known_unit,
+    parameter_title,
+    quantity_of,
+    three_digits,
+    typeset,
+)
 
 
 def test_the_channel_of_a_corner_is_shown_as_that_of_any_other():
@@ -76,3 +86,56 @@ def test_zero_has_no_minus_sign_on_a_page(text, shown):
 def test_a_page_gives_three_digits_and_whole_numbers_from_a_hundred_on():
     texts = [three_digits(value) for value in (19.0, -0.05541, 1.1, 330.7, 1530.2, 0.0)]
     assert texts == ["19.0", "\N{MINUS SIGN}0.0554", "1.10", "331", "1530", "0.00"]
+
+
+BASE = {
+    "kg": (1.0, (1, 0, 0, 0)), "m": (1.0, (0, 1, 0, 0)), "s": (1.0, (0, 0, 1, 0)), "rad": (1.0, (0, 0, 0, 1)),
+    "N": (1.0, (1, 1, -2, 0)), "g": (9.81, (0, 1, -2, 0)), "deg": (math.pi / 180.0, (0, 0, 0, 1)),
+    "mm": (1e-3, (0, 1, 0, 0)), "km": (1e3, (0, 1, 0, 0)), "h": (3600.0, (0, 0, 1, 0)), "Nm": (1.0, (1, 2, -2, 0)),
+    "100deg": (math.pi / 1.8, (0, 0, 0, 1)), "1": (1.0, (0, 0, 0, 0)),
+}  # fmt: skip
+"""Factors to SI and exponents of kg, m, s and rad; 9.81 m/s2 is the gravity of all cars and roads."""
+NAMED = {
+    "kN": ("N", 1e3), "kNm": ("Nm", 1e3), "Pa": ("N/m2", 1.0), "kPa": ("N/m2", 1e3), "MPa": ("N/m2", 1e6),
+    "bar": ("N/m2", 1e5), "J": ("Nm", 1.0), "kJ": ("Nm", 1e3), "W": ("Nm/s", 1.0), "mph": ("m/s", 0.44704),
+    "rpm": ("rad/s", math.pi / 30.0), "Hz": ("rad/s", 2.0 * math.pi), "cm": ("m", 0.01), "ms": ("s", 1e-3),
+    "us": ("s", 1e-6), "arcmin": ("deg", 1.0 / 60.0), "%": ("1", 0.01),
+}  # fmt: skip
+"""Units with names of their own, in others."""
+
+
+def composed(name: str) -> tuple[float, np.ndarray]:
+    """Return factor and exponents of a unit from the units in its name."""
+    if name in NAMED:
+        of, size = NAMED[name]
+        factor, exponents = composed(of)
+        return size * factor, exponents
+    # `(m/s2)/rad` is divided at its last stroke, `rad/(m/s2)` at its first one.
+    above, stroke, below = name.rpartition("/") if name.startswith("(") else name.partition("/")
+    if stroke:
+        (factor, exponents), (divisor, others) = (composed(part.strip("()")) for part in (above, below))
+        return factor / divisor, exponents - others
+    factor, exponents = 1.0, np.zeros(4, int)
+    for word in name.split():
+        unit, power = (word, 1) if word in BASE else (word[:-1], int(word[-1]))
+        factor *= BASE[unit][0] ** power
+        exponents += power * np.array(BASE[unit][1])
+    return factor, exponents
+
+
+@pytest.mark.parametrize("name", UNIT_NAMES)
+def test_a_unit_has_the_size_and_the_dimension_of_its_parts(name):
+    factor, exponents = composed(name)
+    unit = known_unit(name)
+    assert unit.factor == pytest.approx(factor, rel=1e-12)
+    angles = {"rad/rad"}  # a ratio of two angles is a pure number
+    assert unit.dimension == (tuple(exponents.tolist()) if name not in angles else (0, 0, 0, 0))
+
+
+def test_units_of_one_quantity_are_alike_and_others_are_not():
+    assert alike(find_unit("km/h"), find_unit("mph"))
+    assert alike(find_unit("N.m"), find_unit("kNm"))
+    assert not alike(find_unit("N"), find_unit("Nm"))
+    assert not alike(find_unit("deg"), find_unit(""))
+    assert find_unit("KM/H") is None
+    assert find_unit("KM/H", any_case=True) == known_unit("km/h")

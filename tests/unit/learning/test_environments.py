@@ -147,7 +147,7 @@ def test_the_terms_of_the_reward_are_those_of_the_recorded_motion(task: str) -> 
     else:
         # The wheel is held nearly straight, so that the desired yaw rate is far below its limit. The accelerometer
         # pitches with the body, nose down, and shows a part of gravity.
-        braking = -(at("ax_mps2") / 9.80665 - np.sin(at("pitch_rad")))
+        braking = -(at("ax_mps2") / 9.81 - np.sin(at("pitch_rad")))
         config = env.episodes.loop(0).controller_setup.single_track
         gain = yaw_rate_gain(SingleTrack(config), at("vx_mps"))
         demand = at("front_steer_demand_rad")
