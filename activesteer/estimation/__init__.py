@@ -1,8 +1,4 @@
-"""Estimation of the motion of the car from its sensors, with standard deviations.
-
-In: measurements and the controllers' demands.
-Out: speed, sideslip angle, yaw rate, friction and axle stiffness, with standard deviations.
-"""
+"""Estimator of speed, sideslip, yaw rate, friction and axle stiffness with standard deviations, from the sensors."""
 
 from activesteer.estimation.setup import EstimatorParameters, EstimatorSetup, KnownTyre
 
