@@ -25,13 +25,7 @@ def text_table(
     gap: int = 2,
     marks: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a table.
-
-    Its first row is the head.
-
-    A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
-    tables below each other, or its words are wrapped.
-    """
+    """Yield the lines of a table with its head, with narrow columns, split or wrapped if it is too wide."""
     rows = [[unsigned_zeros(cell) for cell in row] for row in rows]
     marks = marks or [""] * len(rows)
     width = COLUMNS - len(marks[0])
