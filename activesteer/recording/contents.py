@@ -359,11 +359,8 @@ ScenePart = Primitive | Link
 
 
 def encode_scene(parts: Iterable[ScenePart]) -> bytes:
-    """Serialise a scene as a foxglove.SceneUpdate.
-
-    Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, with
-    its points in the metadata: Foxglove has no solid that spans two frames.
-    """
+    """Serialise a scene as a foxglove.SceneUpdate: an entity for each body with solids, and for each link."""
+    # Foxglove has no solid that spans two frames: a link is an entity without a solid, with its points in the metadata.
     update = message_class(SCENE_SCHEMA)()
     entities: dict[str, Any] = {}
     parts = tuple(parts)
