@@ -97,11 +97,9 @@ def per_call_us(function: Callable[..., object], count: int, *arguments: Any) ->
 
 
 def _engine(scenario: Scenario, *, forces: bool) -> float:
-    """Return the time of the engine's step on a standing car [us], with or without our forces.
-
-    Without them, their value at the start is applied as a constant, so that the car stays near its place. A falling
-    car, with its springs at their stops, would be another problem for the engine's solver.
-    """
+    """Return the time of the engine's step on a standing car [us], with or without our forces."""
+    # Without them, their value at the start is applied as a constant, so that the car stays near its place. A falling
+    # car, with its springs at their stops, would be another problem for the engine's solver.
     loop = ClosedLoop(scenario, _CONTROLLER)
     model, data = loop.vehicle.model, loop.vehicle.data
     if forces:
@@ -187,11 +185,7 @@ def _with_file(scenario: Scenario, path: Path) -> float:
 
 
 def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure the cost of the tyres: one evaluation of a tyre, and all four tyres in the engine.
-
-    `four_tyres_us` are the microseconds that four tyres with contact, relaxation and the application of their forces
-    add to the engine's passive forces, in the same state.
-    """
+    """Measure one evaluation of a tyre, and what four tyres with contact and relaxation add to the engine [us]."""
     scenario = resolve("straight_line")
     vehicle = ClosedLoop(scenario).vehicle
     header = fb.header_of(vehicle.model)
