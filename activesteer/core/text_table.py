@@ -53,12 +53,12 @@ def text_table(
     yield from _lines(rows, widths, text, gap, marks)
 
 
-def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
+def wrapped_line(line: str) -> list[str]:
     """Split a line into pieces that fit, with all but the first indented by four more columns."""
-    if _length(line) <= width:
+    if _length(line) <= COLUMNS:
         return [line]
     indent = " " * (len(line) - len(line.lstrip()) + 4)
-    return textwrap.wrap(line, width, subsequent_indent=indent, **WHOLE)
+    return textwrap.wrap(line, COLUMNS, subsequent_indent=indent, **WHOLE)
 
 
 def _length(cell: str) -> int:

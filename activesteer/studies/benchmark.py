@@ -39,7 +39,7 @@ _RUNS_PER_PROCESS: Final = 4
 _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
-def bench(rounds: int = ROUNDS) -> dict[str, float]:
+def bench(rounds: int) -> dict[str, float]:
     """Measure the time of a step at several stages, and the speed of whole runs."""
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
@@ -184,7 +184,7 @@ def _with_file(scenario: Scenario, path: Path) -> float:
     return (time.perf_counter() - start) / simulation.steps * 1e6
 
 
-def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
+def bench_tyre(rounds: int) -> dict[str, float]:
     """Measure one evaluation of a tyre, and what four tyres with contact and relaxation add to the engine [us]."""
     scenario = resolve("straight_line")
     vehicle = ClosedLoop(scenario).vehicle
@@ -212,7 +212,7 @@ _REAR_PER_YAW_RATE_S: Final = 0.05
 """Rear wheel angle of this law per yaw rate [s]."""
 
 
-def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
+def bench_batch(rounds: int) -> dict[str, float]:
     """Measure batches of cars in the sine with dwell, best of several interleaved rounds."""
     found: dict[str, float] = {}
     for size in SIZES:
