@@ -52,8 +52,7 @@ class AxleSlopes(NativeBlock):
         self._cg_to_front_m, self._cg_to_rear_m = self._car.cg_to_front_m, self._car.cg_to_rear_m
         curves = []
         for tyre, load_N in zip(known.tyres, loads_N, strict=True):
-            loads = tyre.load_step_N * np.arange(len(tyre.force_N))
-            curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
+            curve = np.array([np.interp(load_N, tyre.loads_N, column) for column in np.array(tyre.force_N).T])
             curves.append(array("d", (curve / (curve[1] / self._step_rad)).tolist()))
         self._front_curve, self._rear_curve = curves
         self._front_excess_rad, self._rear_excess_rad = (
@@ -71,7 +70,7 @@ class AxleSlopes(NativeBlock):
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
     """Return how far an axle's slip angle exceeds the linear one, at rising lateral accelerations [rad]."""
-    grid, loads_N = np.array(tyre.force_N), tyre.load_step_N * np.arange(len(tyre.force_N))
+    grid, loads_N = np.array(tyre.force_N), tyre.loads_N
     mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries the same fraction of side force and weight
     angles_rad, ay_mps2 = tyre.slip_angle_step_rad * np.arange(grid.shape[1]), np.zeros(grid.shape[1])
     for _ in range(_ROUNDS):  # load transfer and force depend on each other

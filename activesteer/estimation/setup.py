@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.theory.single_track import SingleTrackParameters, TwoTrackParameters
 
 _Positive = Annotated[float, Range(1e-9)]
@@ -113,15 +113,18 @@ class KnownTyre:
     slip_stiffness: float  # longitudinal force per slip and load, as all three under the static load
     rolling_radius_m: float
 
+    @property
+    def loads_N(self) -> Array:
+        """Loads of the grid [N]."""
+        return self.load_step_N * np.arange(len(self.force_N))
+
     def stiffness_at(self, load_N: float) -> float:
         """Return the cornering stiffness under a load [N/rad]."""
-        loads_N = self.load_step_N * np.arange(len(self.force_N))
-        return float(np.interp(load_N, loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
+        return float(np.interp(load_N, self.loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
 
     def most_N(self, load_N: float) -> float:
         """Return the largest lateral force under a load [N]."""
-        loads_N = self.load_step_N * np.arange(len(self.force_N))
-        return float(np.interp(load_N, loads_N, np.array(self.force_N).max(axis=1)))
+        return float(np.interp(load_N, self.loads_N, np.array(self.force_N).max(axis=1)))
 
 
 @dataclass(frozen=True)
