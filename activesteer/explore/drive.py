@@ -94,7 +94,7 @@ class HandDriver:
         car = setup.single_track
         # `hands` is what is asked for now. Without a foot on a pedal, the driver holds `hold_mps`, or coasts if None.
         self.hands, self.hold_mps = Act(steer=0.0), hold_mps
-        self._wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
+        self._wheelbase_m = car.wheelbase_m
         # A car that does not understeer has no characteristic speed.
         self._understeer_s2pm2 = 1.0 / car.characteristic_speed_mps**2 if car.characteristic_speed_mps else 0.0
         self._setup, self._angle_rad, self._throttle, self._brake = setup, 0.0, 0.0, 0.0
