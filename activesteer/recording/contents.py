@@ -423,11 +423,9 @@ def _new_entity(update: Any, frame: str, name: str) -> Any:
 
 
 def _link_of(table: dict[str, Any]) -> Link:
-    points = []
-    for body, (x_m, y_m, z_m) in table["points"]:
-        points.append((str(body), (float(x_m), float(y_m), float(z_m))))
+    points = tuple((str(body), (float(x_m), float(y_m), float(z_m))) for body, (x_m, y_m, z_m) in table["points"])
     r, g, b, a = (float(value) for value in table["rgba"])
-    return Link(str(table["name"]), str(table["kind"]), tuple(points), float(table["radius_m"]), (r, g, b, a))
+    return Link(str(table["name"]), str(table["kind"]), points, float(table["radius_m"]), (r, g, b, a))
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:
