@@ -46,7 +46,7 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 _NEAR_SHARE: Final = 0.005
-"""Fraction of a value below which a difference has no percentage, or equals if its significance is not known."""
+"""Fraction of a value below which a difference has no percentage, and none counts without a known significance."""
 
 
 class Change(StrEnum):

@@ -473,7 +473,7 @@ def steady_turn(
 def model(
     car: SingleTrackParameters, parameters: LqrParameters, servo_lag_s: float, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
-    """Return system (8, 8) and input matrix (8, 2) over one call, for constant superposition and rear angle."""
+    """Return the matrices (8, 8) of `STATES` and (8, 2) of superposition and rear angle, both held over one call."""
     inner, both = np.zeros((8, 8)), np.eye(2)
     inner[:2, :2], inner[:2, 2:4] = SingleTrack(car).matrices(speed_mps)
     tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / servo_lag_s

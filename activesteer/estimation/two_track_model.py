@@ -91,7 +91,9 @@ def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
 
 @compiled
 def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction, stiffness):
-    """Return the lateral force of both tyres of an axle [N]; `shift_N` is the load transfer from left to right."""
+    """Return the lateral force of both tyres of an axle [N], positive for a positive slip angle."""
+    # `load_N` is the mean load of both wheels, `shift_N` the load transfer from the left to the right wheel. `left_N`
+    # and `right_N` are longitudinal forces, and `stiffness` is relative to new tyres.
     size_rad, total_N = min(max(stiffness, LEAST_STIFFNESS), LARGEST_STIFFNESS) * abs(angle_rad) / friction, 0.0
     for sign, along_N in ((-1.0, left_N), (1.0, right_N)):
         own_N = max(load_N + sign * shift_N, 0.0)

@@ -326,7 +326,7 @@ class Episodes:
         return np.clip(actions, self._low, 1.0)
 
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
-        """Convert bounded actions to commands, arrays of length n or zeros; None for a driver that is no agent."""
+        """Convert bounded actions to commands, arrays of length n or zeros; no driver command without an agent."""
         columns: dict[str, Any] = {
             name: scale * actions[:, place] for place, (name, _, scale) in enumerate(self.actions)
         }

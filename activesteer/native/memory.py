@@ -97,7 +97,8 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """Return the numba type of a message whose class and length are checked: one that is too short ends the process."""
+    """Return the numba type of a message from Python, whose numbers become float64."""
+    # Check class and length of a message first: one that is too short ends the process.
     widths = widths_of(message)
     return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
 

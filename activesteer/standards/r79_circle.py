@@ -426,7 +426,8 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the longest duration of a fault within the limits [s] by bisection: longer faults have larger effects."""
+    """Find the longest duration of a fault within the limits [s], by bisection."""
+    # The search assumes that a longer fault has a larger effect. It returns the bound that meets the limits.
     good, bad = 0, round(broken_s / runs.timestep_s)
     while bad - good > max(1.0, _RESOLUTION_S / runs.timestep_s):
         middle = (good + bad) // 2

@@ -25,7 +25,8 @@ _TOLERANCE_N: Final = 1e-7
 
 
 def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
-    """Move the car, near equilibrium, into static equilibrium by Newton's method, at rest."""
+    """Move the car, which stands near it, into static equilibrium by Newton's method on the forces at rest."""
+    # The tyres carry their load, and no lateral force except from their own asymmetry.
     free = np.setdiff1d(np.arange(model.nv), held)
     data.qvel[:] = 0.0
     if model.na:

@@ -63,7 +63,7 @@ class Signals(NamedTuple):
 
 
 def signals_of(messages: Sequence[type[Any]]) -> Signals:
-    """Return the signals of messages: a field of the wheels is one of four numbers and four of one number."""
+    """Return the signals of messages: a field of the wheels is one signal of four numbers, and four of one."""
     # If several messages have a field, its name means the first of them; `message.field` means any of them.
     places: dict[str, tuple[Place, ...]] = {}
     others = set()

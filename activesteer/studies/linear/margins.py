@@ -65,7 +65,7 @@ from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
-"""Frequencies [rad/s]: from a hundredth of the car's to beyond the suspensions' natural frequencies."""
+"""Frequencies [rad/s], from a hundredth of the car's natural frequency to beyond those of its suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
 ASKED_DISK: Final = 0.5

@@ -3,6 +3,8 @@
 Source: Besselink, Schmeitz, Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation pressure
 changes, Vehicle System Dynamics 48 (2010) S1, equations 1 to 10 (the same in Pacejka 2012, A3.1 to A3.7); camber and
 side force terms of MF 6.2: MF-Tyre/MF-Swift 6.2 equation manual (2013).
+
+`deflection_m` is the free radius minus the loaded radius of the rotating tyre; zero or less gives no force.
 """
 
 from __future__ import annotations
@@ -54,7 +56,7 @@ def _softening(p, omega: float, fx: float, fy: float) -> float:
 def vertical_force_loaded(
     p, deflection_m: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
-    """Elastic vertical force [N], softened by horizontal forces and camber; none without deflection of the free radius.
+    """Elastic vertical force [N], with the softening by horizontal forces and by camber.
 
     Source: Besselink 2010, equations 2 to 5; MF 6.2 manual for FITTYP 62.
     """
