@@ -175,7 +175,7 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
 
 
 def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> float:
-    """Return the time between calls [s]: `controllers.interval_s`, else the controller's `interval_s`, else the step."""
+    """Return the time between calls [s]: `controllers.interval_s`, else the controller's, else the step."""
     given = parameters.interval_s
     own = getattr(plugin.origin, "interval_s", None)
     if given is None and own is None:

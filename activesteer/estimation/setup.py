@@ -116,7 +116,7 @@ class KnownTyre:
     @property
     def loads_N(self) -> Array:
         """Loads of the grid [N]."""
-        return self.load_step_N * np.arange(len(self.force_N))
+        return self.load_step_N * np.arange(len(self.force_N), dtype=np.float64)
 
     def stiffness_at(self, load_N: float) -> float:
         """Return the cornering stiffness under a load [N/rad]."""
