@@ -112,10 +112,8 @@ def first_at(recording: RecordingLike, x_m: float) -> int | None:
 
 
 def path_distance(x_m: Array, y_m: Array, path_x_m: Array, path_y_m: Array) -> Array:
-    """Return the distances of points from a polyline, which continues straight beyond both ends.
-
-    The nearest point of the path is on a piece next to the nearest corner point.
-    """
+    """Return the distances of points from a polyline, which continues straight beyond both ends."""
+    # The nearest point of the path is on a piece next to the nearest corner point.
     from scipy.spatial import KDTree  # noqa: PLC0415 - takes a while to import
 
     points = np.column_stack([x_m, y_m])

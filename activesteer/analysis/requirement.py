@@ -78,12 +78,7 @@ _Number = Callable[[Runs], float]
 
 
 class Expression:
-    """Numerical expression over the metrics of runs.
-
-    `metrics` has those that it reads, each with its run.
-
-    `comparisons` has left side, sign and right side of each comparison of a requirement.
-    """
+    """Numerical expression over `metrics` with their runs, and left side, sign and right side of its `comparisons`."""
 
     wanted = "a sum of metrics such as yaw_rate_overshoot(ars) is needed"
 

@@ -97,10 +97,7 @@ def steering(recording: RecordingLike) -> Steering:
 
 
 def marks(recording: RecordingLike) -> list[tuple[float, str]]:
-    """Return the times to mark in plots over time, with their labels.
-
-    They are times of the criterion, starts of phases, or the start of braking.
-    """
+    """Return the times to mark in plots over time, with labels: of the criterion, phases, or the start of braking."""
     if entry(recording, "maneuver", "brake"):
         with suppress(RecordingError):  # a recording of another program
             pressed = np.flatnonzero(recording["brake_pedal"] > 0.0)

@@ -3,9 +3,8 @@
 The car runs straight before the step, so every value counts from zero. t = 0 is the time at which the steering wheel
 passes half of its final angle, interpolated between samples. A steady-state value is the mean over the last second.
 
-Source: ISO 7401, Road vehicles - Lateral transient response test methods, step input.
-
-Source: 49 CFR 571.126 (FMVSS 126), S7.6 and S7.11; NHTSA TP-126, which gives the range of the line.
+Sources: ISO 7401, Road vehicles - Lateral transient response test methods, step input; 49 CFR 571.126 (FMVSS 126),
+S7.6 and S7.11; NHTSA TP-126, which gives the range of the line.
 """
 
 from __future__ import annotations

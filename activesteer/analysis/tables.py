@@ -13,8 +13,7 @@ from activesteer.core.text_table import text_table, wrapped_line
 from activesteer.core.units import typeset
 
 Paint = Callable[[str, str, float, float, str], str]
-"""Function that returns the shown text of a metric. Arguments: label of the run, name, values in this and the first
-run, text."""
+"""Function from label of the run, name, values in this and the first run, and text to the shown text of a metric."""
 
 _FRICTION_NOTE: Final = (
     "friction utilisation is the force of a tyre relative to its longitudinal and lateral peaks at pure slip; "
@@ -47,8 +46,7 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 _NEAR_SHARE: Final = 0.005
-"""Fraction of a value below which a difference is shown without a percentage, which would be 0 %. Values of a metric
-without a known significance count as equal below this fraction."""
+"""Fraction of a value below which a difference has no percentage, and none counts without a known significance."""
 
 
 class Change(StrEnum):

@@ -107,10 +107,7 @@ def _numbered(name: str, elements: Mapping[str, int]) -> str:
 
 
 def find_file(name: str, folders: Sequence[Path], pattern: str, source: Source, key: Sequence[str]) -> Path:
-    """Find a file that a key names, by its path or in one of the folders.
-
-    The error lists the files of the last folder, or of the working directory, that match a pattern.
-    """
+    """Find a file that a key names, by its path or in one of the folders; the error lists the last folder's files."""
     for candidate in (*(folder / name for folder in folders), user_path(name, source.error)):
         if name.isprintable() and is_file(candidate):
             return candidate
@@ -164,10 +161,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_text(table: Mapping[str, Any], remarks: Mapping[str, str] | None = None) -> str:
-    """Return a table as a TOML file that `read_toml` reads, with inner tables below their headers.
-
-    A list of tables is written in one line. Remarks are comments above the header of a table, by its dotted name.
-    """
+    """Return a table as a TOML file for `read_toml`, with remarks above tables by their dotted names."""
     return "\n".join(_lines(table, remarks or {}, "")).lstrip("\n") + "\n"
 
 

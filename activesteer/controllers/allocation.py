@@ -92,22 +92,7 @@ def allocated(
     ay_mps2: float,
     authority: float,
 ) -> tuple[float, float]:
-    """Allocate the demands of the state feedback.
-
-    Args:
-        block: Limits and weights.
-        now: The motion, faster than walking speed.
-        driver_rad: The driver's angle at the road wheels.
-        at_rad: Measured angles of superposition and rear wheels.
-        demand_rad: Angles that the state feedback demands, without limits.
-        range_rad: Smallest and largest superposition angle that are allowed within the limits.
-        works: Whether superposition and rear steering work.
-        ay_mps2: Lateral acceleration of the desired turn [m/s2].
-        authority: Factor on the demands of the state feedback, 0 to 1 [-].
-
-    Returns:
-        Superposition angle and rear angle [rad].
-    """
+    """Allocate the demands of the feedback, faster than walking speed: superposition angle and rear angle [rad]."""
     front_slope, rear_slope = slopes(block._curves, now, driver_rad + at_rad[0], at_rad[1])
     front_N, rear_N = abs(front_slope) * block._front_Nprad, abs(rear_slope) * block._rear_Nprad
     front_Nm, rear_Nm = front_N * block._to_front_m, -rear_N * block._to_rear_m

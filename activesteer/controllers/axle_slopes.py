@@ -31,11 +31,7 @@ is 0.3 deg of slip angle for the compact's tyre; at 0.99 it is 0.7 deg, and the 
 
 
 class AxleSlopes(NativeBlock):
-    """Side force curves of both axles.
-
-    F is the curve of a tyre under its static load. On a road of friction mu the curve is mu F(alpha / mu), with the
-    same slope at zero slip angle.
-    """
+    """Side force curves mu F(alpha / mu) of both axles on a road of friction mu, with F of a tyre under static load."""
 
     _front_excess_rad: Table
     _rear_excess_rad: Table
@@ -56,8 +52,7 @@ class AxleSlopes(NativeBlock):
         self._cg_to_front_m, self._cg_to_rear_m = self._car.cg_to_front_m, self._car.cg_to_rear_m
         curves = []
         for tyre, load_N in zip(known.tyres, loads_N, strict=True):
-            loads = tyre.load_step_N * np.arange(len(tyre.force_N))
-            curve = np.array([np.interp(load_N, loads, column) for column in np.array(tyre.force_N).T])
+            curve = np.array([np.interp(load_N, tyre.loads_N, column) for column in np.array(tyre.force_N).T])
             curves.append(array("d", (curve / (curve[1] / self._step_rad)).tolist()))
         self._front_curve, self._rear_curve = curves
         self._front_excess_rad, self._rear_excess_rad = (
@@ -74,11 +69,8 @@ class AxleSlopes(NativeBlock):
 
 
 def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
-    """Return the excess of an axle's slip angle over the linear slip angle, at rising lateral accelerations [rad].
-
-    `load_N` is the static load of a wheel, `shift_kg` the load transfer per lateral acceleration.
-    """
-    grid, loads_N = np.array(tyre.force_N), tyre.load_step_N * np.arange(len(tyre.force_N))
+    """Return how far an axle's slip angle exceeds the linear one, at rising lateral accelerations [rad]."""
+    grid, loads_N = np.array(tyre.force_N), tyre.loads_N
     mass_kg = 2.0 * load_N / GRAVITY_MPS2  # an axle carries the same fraction of side force and weight
     angles_rad, ay_mps2 = tyre.slip_angle_step_rad * np.arange(grid.shape[1]), np.zeros(grid.shape[1])
     for _ in range(_ROUNDS):  # load transfer and force depend on each other
@@ -98,16 +90,7 @@ def _excesses(tyre: KnownTyre, load_N: float, shift_kg: float) -> list[float]:
 
 @shared
 def slopes(block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float) -> tuple[float, float]:
-    """Return the slopes of front and rear axle, as fractions of the slopes at zero slip angle [-].
-
-    A slope is negative if the side force of its axle points to the right.
-
-    Args:
-        block: The curves.
-        now: The motion, faster than walking speed.
-        front_rad: Angle of the front wheels [rad].
-        rear_rad: Angle of the rear wheels [rad].
-    """
+    """Return the slopes of both axles relative to zero slip angle [-]; negative for a side force to the right."""
     speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
     turning /= speed
     front = front_rad - sideslip - block._cg_to_front_m * turning
@@ -130,16 +113,7 @@ def _slope(curve: Table, step_rad: float, slip_angle_rad: float, friction: float
 
 @shared
 def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, float]:
-    """Return the additional slip angles that the nonlinear axles need in a steady turn.
-
-    Args:
-        block: The curves.
-        ay_mps2: Lateral acceleration, limited by the friction [m/s2].
-        friction: Friction of the road [-].
-
-    Returns:
-        Slip angles of front and rear axle, positive to the side of the turn [rad].
-    """
+    """Return the slip angles that the nonlinear axles add in a steady turn, positive to the side of the turn [rad]."""
     place = abs(ay_mps2) / friction / _AY_STEP_MPS2
     size = math.copysign(friction, ay_mps2)
     return size * _between(table(block._front_excess_rad), place), size * _between(table(block._rear_excess_rad), place)
@@ -149,10 +123,8 @@ def excess(block: AxleSlopes, ay_mps2: float, friction: float) -> tuple[float, f
 def axle_forces(
     block: AxleSlopes, now: Estimate, front_rad: float, rear_rad: float
 ) -> tuple[float, float, float, float]:
-    """Return the slip angles of both axles [rad], and their side forces per unit of the mass on the axle [m/s2].
-
-    Beyond the tabulated part a force keeps its last value, as a sliding tyre keeps most of its force.
-    """
+    """Return the slip angles of both axles [rad], and their side forces per unit of the mass on the axle [m/s2]."""
+    # Beyond the table a force keeps its last value, as a sliding tyre keeps most of its force.
     speed, sideslip, turning, friction = now[_SPEED], now[_SIDESLIP], now[_YAW_RATE], now[_FRICTION]
     front = front_rad - sideslip - block._cg_to_front_m * turning / speed
     rear = rear_rad - sideslip + block._cg_to_rear_m * turning / speed

@@ -85,15 +85,7 @@ def brake_levers(setup: ControllerSetup) -> tuple[float, float]:
 def wheel_torques(
     moment_Nm: float, yaw_rate_radps: float, levers: tuple[float, float], limit_Nm: float
 ) -> tuple[float, float, float, float]:
-    """Return the brake torques that create a yaw moment with one wheel, in the order of `CORNERS` [Nm].
-
-    Args:
-        moment_Nm: Yaw moment, left positive [Nm].
-        yaw_rate_radps: Yaw rate; the outer front wheel creates a moment against it, the inner rear wheel a moment with
-            it.
-        levers: Return value of `brake_levers`.
-        limit_Nm: Largest torque of a wheel [Nm].
-    """
+    """Return the brake torques that create a yaw moment, left positive, with one wheel, in `CORNERS` order [Nm]."""
     front = moment_Nm * yaw_rate_radps <= 0.0
     torque = min(abs(moment_Nm) * levers[0 if front else 1], limit_Nm)
     # A brake on the left turns the car to the left.

@@ -140,13 +140,7 @@ def system_of(given: str) -> str:
 
 
 def keys_read(given: Any) -> frozenset[str]:
-    """Return the keys of the table [controllers] that affect a controller and its control unit.
-
-    A user's own code may read all of them.
-
-    Args:
-        given: See `controller_spec`.
-    """
+    """Return the keys of the table [controllers] that affect a controller; a user's own code may read all of them."""
     plugin = controller_spec(given)
     if not plugin.is_builtin:
         return frozenset(field.name for field in fields(ControllerParameters))
@@ -154,16 +148,7 @@ def keys_read(given: Any) -> frozenset[str]:
 
 
 def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
-    """Return the parameters of a controller by key, each with default, unit, range and type.
-
-    Args:
-        given: See `controller_spec`.
-        gains: The table [controllers] of a vehicle file, for the values of a built-in controller.
-
-    Returns:
-        Dotted keys in SI, such as `controllers.ars.limit_rad` or `controllers.YawBeta.k_beta`; no gains that a variant,
-        or text after a `?`, has fixed.
-    """
+    """Return the parameters by dotted SI key, without those that a variant or text after a `?` fixes."""
     plugin, table = controller_spec(given), f"{CONTROLLER.table}."
     if not plugin.is_builtin:
         own = plugin.declared.items()
@@ -190,10 +175,7 @@ def load_controller(given: Any, setup: ControllerSetup) -> Controller:
 
 
 def interval_s(plugin: Plugin, parameters: ControllerParameters, timestep_s: float) -> float:
-    """Time between two calls of a controller [s].
-
-    It is `controllers.interval_s` of the vehicle file, else the controller's attribute `interval_s`, else the step.
-    """
+    """Return the time between calls [s]: `controllers.interval_s`, else the controller's, else the step."""
     given = parameters.interval_s
     own = getattr(plugin.origin, "interval_s", None)
     if given is None and own is None:

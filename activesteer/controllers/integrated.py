@@ -66,16 +66,11 @@ from activesteer.core.signals import NO_BRAKES, ActuatorCommand, DriverCommand, 
 from activesteer.errors import ControllerError, not_installed
 
 Solve = Callable[[Array, Array, Array, Array, Array], Array]
-"""Function of H, f, A, lower and upper that returns the x that minimises x' H x / 2 + f' x. The bounds are for x, then
-for A x."""
+"""Function of H, f, A, lower, upper that minimises x' H x / 2 + f' x over x; the bounds are for x, then for A x."""
 
 
 def solver() -> Solve:
-    """Return the dual active-set method of DAQP. Every call starts cold, so the solver has no state.
-
-    Raises:
-        ControllerError: DAQP is not installed.
-    """
+    """Return the dual active-set method of DAQP. Every call starts cold, so the solver has no state."""
     try:
         import daqp  # noqa: PLC0415 - an extra
     except ImportError as error:
@@ -91,18 +86,7 @@ def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: A
 
 
 class SupervisedActuator:
-    """Monitor of an actuator that must approach its demand.
-
-    An actuator is suspected if all demands of a window were on the same side of its position, by more than a tolerance,
-    and it has not moved there by a tenth of the least distance. It counts as failed, until the end of the run, once it
-    is suspected for as long as the window. A slow actuator, a weak supply or a delayed bus still approach; an actuator
-    that is stuck, floats or runs away does not. An actuator that follows a demand which has turned back counts as
-    working.
-
-    Attributes:
-        failed: Whether the actuator has failed.
-        held_rad: Position in which it failed [rad]; its demand from then on, as a measured one would creep.
-    """
+    """Monitor of an actuator that fails, until the end of the run, once it stops approaching its demand."""
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
         """Start with a working actuator."""
@@ -123,10 +107,12 @@ class SupervisedActuator:
         moved_rad = position_rad - position_then_rad
         if gap_rad < 0.0:
             gap_rad, moved_rad = position_then_rad - max(demands_rad), -moved_rad
+        # A slow actuator, a weak supply or a delayed bus still approach. A stuck, floating or runaway actuator does
+        # not. A demand that has turned back suspects none.
         if gap_rad > self._tolerance_rad and moved_rad < 0.1 * gap_rad:
             self._suspected += 1
-            if self._suspected > self._steps and not self.failed:
-                self.failed, self.held_rad = True, position_rad
+            if self._suspected > self._steps and not self.failed:  # counts as failed if suspected for a whole window
+                self.failed, self.held_rad = True, position_rad  # a measured position would creep
         else:
             self._suspected = 0
         return self.failed

@@ -1,9 +1,7 @@
 """Linear form of a controller about straight driving, from its equations or its frequency response.
 
-A controller gets the measurements of a car that drives straight ahead until it has settled, and then a small pulse in
-one of them. The difference from its response without the pulse is its impulse response. The Fourier sum of the impulse
-response is the frequency response, exact for a controller that is linear about this point. An observer, a programme
-without active limits and a user's own code thus have a frequency response like a transfer function.
+The difference of its responses with and without a small pulse in one measurement is its impulse response. The
+Fourier sum of that is its frequency response, exact for a controller that is linear about this point.
 """
 
 from __future__ import annotations
@@ -32,14 +30,8 @@ _LINEAR: Final = ("none", "ars", "afs")
 class LinearController:
     """Linear controller x[k+1] = A x[k] + B w[k], u[k] = C x[k] + D w[k], with one step of the setup per k.
 
-    Inputs w: the driver's demand at the road wheel [rad], the yaw rate [rad/s]. Outputs u: rear steer angle and
-    superposition demanded [rad].
-
-    Attributes:
-        a: Shape (n, n).
-        b: Shape (n, 2).
-        c: Shape (2, n).
-        d: Shape (2, 2).
+    Inputs w: the driver's demand at the road wheel [rad], the yaw rate [rad/s]. Outputs u: demanded rear steer angle
+    and superposition [rad].
     """
 
     a: Array
@@ -54,18 +46,10 @@ def has_linear_form(given: Any) -> bool:
 
 
 def linear_controller(given: str, setup: ControllerSetup, speed_mps: float) -> LinearController:
-    """Return the linear form of a controller.
+    """Return the linear form of a controller, or raise ControllerError if it has none, for instance a user's own code.
 
     The tolerance function is taken as 1, so that the corrector acts at all errors. Within its band only the feedforward
     is left: the car with `afs` is then the car without control.
-
-    Args:
-        given: `none`, `ars`, `afs`, or a variant.
-        setup: Input of the controller.
-        speed_mps: Speed [m/s].
-
-    Raises:
-        ControllerError: the controller has no linear form, for instance a user's own code.
     """
     gains, system = setup.gains, given
     if is_variant(given):
@@ -122,23 +106,9 @@ def pulse_responses(
     name: str = "it",
     held: Mapping[str, tuple[int, int]] | None = None,
 ) -> Array:
-    """Return the impulse responses of a controller to its measurements.
-
-    Args:
-        controller: The controller of a run; it is copied.
-        rolling: Measurement of a car that drives straight ahead at its speed.
-        interval_s: Time between two calls [s].
-        name: Name of the controller, for the message.
-        held: Signal to two numbers of calls: for how long a sample of its sensor is held, and the offset of the first
-            call that sees it. An estimator that takes each sample once responds to the whole sample, not to one call of
-            it.
-
-    Returns:
-        Shape (calls, len(COMMANDS), len(SIGNALS)): response per unit of a sample, from the call that sees it on.
-
-    Raises:
-        ControllerError: the response to a small pulse is not proportional to it, or does not end.
-    """
+    """Return the impulse responses to a unit of a sample, shape (calls, len(COMMANDS), len(SIGNALS))."""
+    # `held`: for how many calls a signal's sensor holds a sample, and the offset of the first call that sees it. An
+    # estimator that takes each sample once responds to the whole sample, not to one call of it.
     held = held or {}
     settled = copy.deepcopy(controller)
     _answers(settled, rolling, interval_s, round(_SETTLE_S / interval_s))

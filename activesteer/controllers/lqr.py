@@ -101,30 +101,20 @@ _SPEED, _SIDESLIP, _YAW_RATE, _FRICTION, _FRICTION_STD, _FRONT_STIFFNESS, _REAR_
 _SAME_RAD: Final = 1e-6
 """Difference of an angle from its demand that does not count as a limit [rad]."""
 _LIMIT_FROM, _LIMIT_TO = 0.95, 1.05
-"""Use of the known friction by the desired turn from which the time at the limit counts, and from which it counts fully
-[-]. The first values that were tried."""
+"""Use of the known friction from which the time at the limit starts to count, and counts fully [-]. First choice."""
 _FULL_MPS: Final = 8.0
 """Speed from which the controller acts fully; below it, its action fades out until `MIN_SPEED_MPS` [m/s]."""
 
 
 class Turn(NamedTuple):
-    """Desired turn, with its superposition and rear angle.
-
-    Attributes:
-        estimate: Estimate of the motion.
-        desired_radps: Desired yaw rate [rad/s].
-        sideslip_rad: Steady-state sideslip angle [rad].
-        steady_rad: Steady-state angles [rad].
-        demand_rad: Angles that the state feedback demands, without limits [rad].
-        range_rad: Smallest and largest superposition angle that the driver and the yaw rate allow [rad].
-    """
+    """Desired turn, with its superposition and rear angle."""
 
     estimate: Estimate
     desired_radps: float
     sideslip_rad: float
     steady_rad: tuple[float, float]
-    demand_rad: tuple[float, float]
-    range_rad: tuple[float, float]
+    demand_rad: tuple[float, float]  # without limits
+    range_rad: tuple[float, float]  # smallest and largest superposition that driver and yaw rate allow
 
 
 class Lqr(NativeBlock):
@@ -220,11 +210,7 @@ class Lqr(NativeBlock):
         works: tuple[bool, bool] = BOTH,
         own_brakes_Nm: PerWheel = NO_BRAKES,
     ) -> Turn:
-        """Return the desired turn and the feedback demands, which are zero below walking speed.
-
-        `works` says whether superposition and rear steering work, `own_brakes_Nm` the brake torques that the controller
-        itself demands.
-        """
+        """Return the desired turn and the feedback demands, which are zero below walking speed."""
         if works != (self._superposition_works, self._rear_works):
             self._adapt(works)
         now = self._estimator.step(measurement)
@@ -372,10 +358,7 @@ def fed_back(
 
 @shared
 def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
-    """Return the understeer gradient that softer tyres add, at least 0 [s2 rad/m].
-
-    It fades to 0 as the friction becomes `certain`.
-    """
+    """Return the understeer gradient of softer tyres, at least 0, which fades with `certain` friction [s2 rad/m]."""
     front = 1.0 + (1.0 - certain) * min(now[_FRONT_STIFFNESS] - 1.0, 0.0)
     rear = 1.0 + (1.0 - certain) * min(now[_REAR_STIFFNESS] - 1.0, 0.0)
     more = block._front_slip_s2radpm * (1.0 / front - 1.0) - block._rear_slip_s2radpm * (1.0 / rear - 1.0)
@@ -384,12 +367,9 @@ def _understeer(block: Lqr, now: Estimate, certain: float) -> float:
 
 @shared
 def _patience(block: Lqr, driver_rad: float) -> float:
-    """Return the fraction of the superposition that may still act against the driver.
-
-    It counts the time of a superposition against a driver whose angle is not below its own lagged value. A driver who
-    has steered to the other side begins anew.
-    """
+    """Return the fraction of the superposition that may still act against the driver."""
     before = block._driver_before_rad
+    # It counts the time of a superposition against a driver whose angle is not below its own lagged value.
     if driver_rad * before < 0.0:
         block._against_s = 0.0
     elif abs(driver_rad) < abs(before):
@@ -402,11 +382,7 @@ def _patience(block: Lqr, driver_rad: float) -> float:
 
 @shared
 def _faded_at_limit(block: Lqr, desired_radps: float, used: float) -> float:
-    """Return the part of the superposition into the turn that has faded, 0 to 1.
-
-    It counts the time at the limit, as `_patience` counts the time against the driver. A turn to the other side resets
-    it.
-    """
+    """Return the part of the superposition into the turn that has faded, 0 to 1."""
     if desired_radps * block._turned_radps < 0.0:
         block._at_limit_s = 0.0
     block._turned_radps = desired_radps
@@ -463,11 +439,7 @@ def schedule(
     interval_s: float,
     works: tuple[bool, bool] = BOTH,
 ) -> tuple[tuple[float, ...], ...]:
-    """Return the gains at `SPEEDS_MPS`.
-
-    For each speed: front angle, rear angle and sideslip, each per desired yaw rate [s] and per given angle [-]; then
-    the rows of K for superposition and rear angle, in the order of `STATES`.
-    """
+    """Return the gains of `steady_turn` [s, -] at each of `SPEEDS_MPS`, then the rows of K in the order of `STATES`."""
     return tuple(
         (
             *steady_turn(car, speed_mps, works, in_phase=True).ravel().tolist(),
@@ -480,21 +452,12 @@ def schedule(
 def steady_turn(
     car: SingleTrackParameters, speed_mps: float, works: tuple[bool, bool] = BOTH, *, in_phase: bool = False
 ) -> Array:
-    """Return the gains of a steady turn without sideslip: front angle, rear angle and sideslip angle.
-
-    Args:
-        car: The known car.
-        speed_mps: Speed [m/s].
-        works: Whether superposition and rear steering work.
-        in_phase: Whether the rear wheels never turn out of phase, which would swing the tail out of the lane: below the
-            speed at which the sideslip of the car with straight rear wheels changes sign, the turn has that sideslip.
-
-    Returns:
-        Shape (3, 2): each per yaw rate and per given angle of an axle.
-    """
+    """Return front angle, rear angle and sideslip of a steady turn, per yaw rate and per given angle: shape (3, 2)."""
     a, b = SingleTrack(car).matrices(speed_mps)
     turn = np.zeros((3, 2))
     if works == BOTH:
+        # With `in_phase` the rear wheels never turn out of phase, which would swing the tail out of the lane. The turn
+        # has the sideslip of the car with straight rear wheels, below the speed at which this sideslip changes sign.
         if in_phase:  # the unknowns are front angle and sideslip, for straight rear wheels
             turn[2, 0] = max(float(np.linalg.solve(np.column_stack([b[:, 0], a[:, 1]]), -a[:, 0])[1]), 0.0)
         turn[:2, 0] = np.linalg.solve(b, -a[:, 0] - a[:, 1] * turn[2, 0])
@@ -510,11 +473,7 @@ def steady_turn(
 def model(
     car: SingleTrackParameters, parameters: LqrParameters, servo_lag_s: float, speed_mps: float, interval_s: float
 ) -> tuple[Array, Array]:
-    """Return the discrete-time model over one call, for constant inputs.
-
-    Returns:
-        System matrix, shape (8, 8) over `STATES`; input matrix, shape (8, 2), inputs superposition and rear angle.
-    """
+    """Return the matrices (8, 8) of `STATES` and (8, 2) of superposition and rear angle, both held over one call."""
     inner, both = np.zeros((8, 8)), np.eye(2)
     inner[:2, :2], inner[:2, 2:4] = SingleTrack(car).matrices(speed_mps)
     tyre_1ps, actuator_1ps = speed_mps / parameters.relaxation_length_m, 1.0 / servo_lag_s

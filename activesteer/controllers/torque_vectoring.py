@@ -52,21 +52,13 @@ _LEAST_RADPS: Final = 1.0
 
 
 class Range(NamedTuple):
-    """Range of the torque difference of an axle, right minus left.
+    """Range of the torque difference of an axle, right minus left."""
 
-    Attributes:
-        place: Its left wheel, 0 or 2.
-        lever: Yaw moment per difference [-].
-        low: Lowest torque that can be added at the left and at the right wheel [Nm].
-        high: Highest torques [Nm].
-        most_Nm: Largest difference that the differential allows [Nm].
-    """
-
-    place: int
-    lever: float
-    low: tuple[float, float]
+    place: int  # its left wheel, 0 or 2
+    lever: float  # yaw moment per difference [-]
+    low: tuple[float, float]  # lowest torques that can be added left and right [Nm]
     high: tuple[float, float]
-    most_Nm: float
+    most_Nm: float  # limit of the differential
 
     def largest_Nm(self, side: float) -> float:
         """Return the largest torque difference towards a side, 1 left or -1 right [Nm]."""

@@ -1,8 +1,6 @@
-"""Controller variants: a controller of the package with other gains, as data.
+"""Controller variants: a controller of the package with other gains, from a file with `system` and [controllers] keys.
 
-A variant file names the controller as `system` and holds the keys of the table [controllers] that differ from the
-vehicle file. A file of the package that has the name of its controller gives the default gains of that controller: keys
-of the vehicle file and overrides replace them.
+A file named like its controller gives default gains: keys of the vehicle file and overrides replace them.
 """
 
 from __future__ import annotations
@@ -35,15 +33,7 @@ class VariantFile(ControllerParameters):
 
 @dataclass(frozen=True)
 class Variant:
-    """A variant that can be created for any car.
-
-    Attributes:
-        name: Short name.
-        title: One line for lists.
-        system: Name of the controller in `CONTROLLERS`.
-        gains: Keys of the table [controllers] that replace the keys of the vehicle file.
-        source: The file.
-    """
+    """A variant that can be created for any car: gains that replace those of the vehicle file."""
 
     name: str
     title: str
@@ -76,11 +66,7 @@ class Variant:
         return CONTROLLERS[self.system](replace(setup, gains=self.gains_in(setup)))
 
     def gains_in(self, setup: ControllerSetup) -> ControllerParameters:
-        """Merge the gains of the variant into the gains of a car.
-
-        Raises:
-            ControllerError: an override names a gain of the variant and would have no effect.
-        """
+        """Merge the gains into those of a car; an override of a gain of the variant raises ControllerError."""
         table = to_table(setup.gains)
         for path, value in leaves(self.gains).items():
             if (key := ".".join(field_path(ControllerParameters, path))) in setup.overridden:
@@ -91,14 +77,7 @@ class Variant:
 
 
 def read_variant(given: str | os.PathLike[str]) -> Variant:
-    """Read a controller variant by its name or its file.
-
-    Args:
-        given: Name, or path of a variant file.
-
-    Raises:
-        ControllerError: the file is not found or wrong.
-    """
+    """Read a controller variant by its name or the path of its file."""
     path = find_controller_variant(given)
     table, source = read_toml(path, ControllerError)
     known = build(VariantFile, {"name": path.stem, **table}, source)

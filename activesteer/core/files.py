@@ -41,11 +41,7 @@ def reading(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Abst
 
 @contextmanager
 def atomic_write(path: str | os.PathLike[str], error: type[ActiveSteerError]) -> Iterator[Path]:
-    """Yield a new file next to `path` that replaces `path` at the end.
-
-    No one can read half a file: if the body fails, the new file is deleted and the old one stays. A device is written
-    directly.
-    """
+    """Yield a new file that replaces `path` at the end, or is deleted if the body fails; write a device directly."""
     with _refused("write", path, error):
         target = Path(os.path.realpath(path))
         if target.exists():
@@ -182,12 +178,7 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Read the rows of a CSV with cells separated by commas, semicolons or tabs.
-
-    The first line with a separator decides which one applies.
-
-    Text after `#` is a comment. With semicolons or tabs, 1,5 is the number 1.5.
-    """
+    """Read the rows of a CSV; the first line with a separator decides which one applies, `#` starts a comment."""
     lines = [line.partition("#")[0] for line in read_text(path, error, limits.MAX_CSV_BYTES).split("\n")]
     separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
@@ -195,6 +186,7 @@ def read_csv(
     try:
         for given in reader:
             cells = [cell.strip() for cell in given]
+            # With semicolons or tabs, 1,5 is the number 1.5.
             if separator != ",":
                 cells = [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in cells]
             if any(cells) or (empty_cells_count and len(cells) > 1):

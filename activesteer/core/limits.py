@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_NUMBER: Final = 1e12
-"""Largest absolute value of a number in a file, in any unit. A larger number is meaningless for a car and may
-overflow."""
+"""Largest absolute value of a number in a file, in any unit: a larger one may overflow."""
 
 # Text files and folders of them.
 MAX_TEXT_BYTES: Final = 2_000_000
@@ -63,9 +62,8 @@ MAX_FILE_BYTES: Final = 2**35
 """Largest size of a file; 20 million rows have about 15 GB. A sparse file of any size could take forever to read."""
 MAX_CHUNK_BYTES: Final = 2**26
 """Largest size of a chunk, compressed or not. One second of a car is 1 MB."""
-MAX_EXPANSION: Final = 200
-"""Largest expansion of a chunk by decompression. The writer leaves a chunk uncompressed if it would exceed this ratio.
-Driving gives 2 to 4, standing still about 50."""
+MAX_EXPANSION: Final = 200  # driving gives 2 to 4, standing still about 50
+"""Largest expansion of a chunk by decompression; the writer leaves a chunk beyond it uncompressed."""
 MAX_OTHER_BYTES: Final = 2**28
 """Largest size of all attachments, schemas and metadata together. Models with meshes have about 50 MB."""
 MAX_OTHER_RECORDS: Final = 20_000

@@ -300,9 +300,5 @@ def metric(name: str) -> Metric:
 
 
 def recorded_metric(name: str) -> Metric:
-    """Return a metric of a recording, declared or not.
-
-    A file of another version may hold a metric that this version does not declare. Such a metric is shown by its full
-    name, which says its SI unit, and its value is not converted.
-    """
+    """Return the metric of a recording; one that only another version declares has its full name and no conversion."""
     return METRICS.get(name) or Metric(name, name, display_unit(""))

@@ -23,28 +23,17 @@ _FINE: Final = 20
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Path through points at equal distances, continued straight beyond both ends.
-
-    Attributes:
-        s_m: Arc length [m], from 0, shape (n,).
-        x_m: World x [m], shape (n,).
-        y_m: World y, left positive [m], shape (n,).
-        heading_rad: Direction of travel [rad], unwrapped, shape (n,).
-        curvature_1pm: Curvature, left positive [1/m], shape (n,).
-    """
+    """Path through points at equal distances, straight beyond both ends; y and curvature are left positive."""
 
     s_m: Array
     x_m: Array
     y_m: Array
-    heading_rad: Array
+    heading_rad: Array  # direction of travel, unwrapped
     curvature_1pm: Array
 
     @classmethod
     def through(cls, x_m: ArrayLike, y_m: ArrayLike) -> Path:
-        """Lay a smooth curve through points: a cubic spline over the chord length.
-
-        A spline overshoots between points of very uneven distance; leave gaps where the path is straight.
-        """
+        """Lay a cubic spline over the chord length; it overshoots between points of very uneven distance."""
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and not needed to read a path
 
         x, y = np.asarray(x_m, dtype=np.float64), np.asarray(y_m, dtype=np.float64)

@@ -25,13 +25,7 @@ def text_table(
     gap: int = 2,
     marks: Sequence[str] = (),
 ) -> Iterator[str]:
-    """Yield the lines of a table.
-
-    Its first row is the head.
-
-    A table that is too wide gets narrower columns, then smaller gaps. If that is not enough, it is split into several
-    tables below each other, or its words are wrapped.
-    """
+    """Yield the lines of a table with its head, with narrow columns, split or wrapped if it is too wide."""
     rows = [[unsigned_zeros(cell) for cell in row] for row in rows]
     marks = marks or [""] * len(rows)
     width = COLUMNS - len(marks[0])
@@ -59,12 +53,12 @@ def text_table(
     yield from _lines(rows, widths, text, gap, marks)
 
 
-def wrapped_line(line: str, width: int = COLUMNS) -> list[str]:
+def wrapped_line(line: str) -> list[str]:
     """Split a line into pieces that fit, with all but the first indented by four more columns."""
-    if _length(line) <= width:
+    if _length(line) <= COLUMNS:
         return [line]
     indent = " " * (len(line) - len(line.lstrip()) + 4)
-    return textwrap.wrap(line, width, subsequent_indent=indent, **WHOLE)
+    return textwrap.wrap(line, COLUMNS, subsequent_indent=indent, **WHOLE)
 
 
 def _length(cell: str) -> int:

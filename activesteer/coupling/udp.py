@@ -64,12 +64,7 @@ _NOTHING: Final[Commands] = (None, None)
 
 
 class UdpLink:
-    """An open port, the `link` of a `Simulation`.
-
-    Attributes:
-        name: Key of the report in the recording.
-        report: Numbers of messages for the recording.
-    """
+    """An open port, the `link` of a `Simulation`, with `report` for the recording."""
 
     name = "udp"
 

@@ -24,10 +24,7 @@ def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
-    """Return the visible geoms as solids, in the frames of their bodies.
-
-    A capsule becomes a cylinder of the same length; meshes and planes are left out.
-    """
+    """Return the visible geoms but meshes and planes as solids in their bodies' frames; capsules become cylinders."""
     solids = []
     for index in range(model.ngeom):
         body = int(model.geom_bodyid[index])
@@ -55,12 +52,9 @@ def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
 
 
 def links_of(model: mujoco.MjModel) -> tuple[Link, ...]:
-    """Return the tendons that run straight from site to site, in the order of the model.
-
-    A tendon named `..._spring` or `..._damper` is a spring or damper; others are links. A fixed tendon has no shape of
-    its own (the front springs and dampers lie along the strut). It is drawn between the sites `NAME_inner` and
-    `NAME_outer` if the model has them.
-    """
+    """Return the tendons that run straight from site to site, in the order of the model."""
+    # A tendon named `..._spring` or `..._damper` is a spring or damper; others are links. A fixed tendon has no shape,
+    # as front springs and dampers along the strut. It is drawn between the sites `NAME_inner` and `NAME_outer`, if any.
     links = []
     for index in range(model.ntendon):
         name = model.tendon(index).name

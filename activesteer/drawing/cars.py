@@ -1,8 +1,4 @@
-"""Outlines and bodies of cars for drawings.
-
-They are added when something is drawn: no model and no recording contains them. `tools/make_bodies.py` creates the
-surfaces.
-"""
+"""Outlines and bodies of cars for drawings, in no model and no recording; `tools/make_bodies.py` creates them."""
 
 from __future__ import annotations
 
@@ -35,10 +31,7 @@ def shares_of(colour: str) -> tuple[float, float, float]:
 
 
 def height_colours(heights_m: Array) -> NDArray[np.uint8]:
-    """Return the colours of heights: grey at 0, lighter above, darker below.
-
-    The scale ends at the largest height, at least 20 mm.
-    """
+    """Return the colours of heights: grey at 0, lighter above, darker below, up to the largest height or 20 mm."""
     share = heights_m / max(0.02, float(np.abs(heights_m).max(initial=0.0)))
     above, below = np.clip(share, 0.0, 1.0)[:, None], np.clip(-share, 0.0, 1.0)[:, None]
     colours = _ASPHALT + above * (_ABOVE - _ASPHALT) + below * (_BELOW - _ASPHALT)
@@ -50,18 +43,15 @@ _SEEN_M: Final = 1.0
 
 
 def share_seen(apart_m: Array | float) -> Array:
-    """Return the opacity factor of a ghost, which fades out between 1 m and 0.2 m from the car.
-
-    Two surfaces in one place would show through each other in patches.
-    """
+    """Return the opacity factor of a ghost, which fades out between 1 m and 0.2 m from the car."""
+    # Two surfaces in one place would show through each other in patches.
     return np.clip((apart_m - _HIDDEN_M) / (_SEEN_M - _HIDDEN_M), 0.0, 1.0)
 
 
 SLOWEST_MPS: Final = 1.0
 """Speed below which the direction is kept [m/s]. The direction of a car at rest is not defined."""
 _STEADY_S: Final = 0.35
-"""Standard deviation of the window over which the direction is averaged [s]. The camera follows a bend but no quick
-motion, so quick motion stays visible."""
+"""Standard deviation of the averaging window of a camera's direction [s]: quick motion stays visible."""
 
 
 def direction_of_motion(time_s: Array, places_m: Array, heading_rad: Array) -> Array:

@@ -71,11 +71,9 @@ class Line(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """A panel of signals over time.
+    """A panel of signals over time, with a colour for each line of one run, or for each of several runs."""
 
-    One run has the colours of its lines. Several runs have a colour each; the first line of a run is full, and views
-    on paper draw the others dotted.
-    """
+    # The first line of each of several runs is full, and views on paper draw the others dotted.
 
     title: str
     quantity: Quantity  # quantity that gives unit, name of the axis, and the least height of the axis

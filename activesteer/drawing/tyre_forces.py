@@ -27,10 +27,7 @@ _ABOVE_ROAD_M: Final = 0.1
 
 
 def force_scale(recordings: Sequence[Recording]) -> float:
-    """Return the force per length of an arrow [N/m], equal for all runs in one view.
-
-    It is proportional to the largest friction under any of their tyres.
-    """
+    """Return the force per length of an arrow [N/m] in one view, proportional to the largest friction."""
     names = [f"{corner}_mu" for corner in CORNERS]
     values = [run[name] for run in recordings for name in names if name in run]
     met = [float(np.max(found[np.isfinite(found)], initial=0.0)) for found in values]

@@ -33,10 +33,7 @@ _NOTHING_RAD: Final = math.radians(0.05)
 
 
 def factors(recordings: Sequence[Recording]) -> tuple[int, ...]:
-    """Return the enlargement factor of each wheel's angle, equal for all runs in one view.
-
-    The factor is ten, and less for an axle that steers by more than 9 deg.
-    """
+    """Return the enlargement factor of each wheel's angle in one view: ten, or less for steer angles above 9 deg."""
     found: list[int] = []
     for axle in (CHANNELS[:2], CHANNELS[2:]):
         angles = [np.abs(run[name]) for run in recordings for name in axle if name in run]

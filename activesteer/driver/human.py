@@ -109,19 +109,11 @@ _MAX_TABLES: Final = 64
 
 
 class SetpointTable(NamedTuple):
-    """Setpoints of successive steps for compiled code.
-
-    The last setpoint is held.
-
-    Attributes:
-        rows: Records of `SETPOINT`.
-        path: The path of all steps.
-        steps: Number of steps that the table is for.
-    """
+    """Setpoints of successive steps for compiled code, as records of `SETPOINT`; the last one is held."""
 
     rows: NDArray[Any]
     path: Path | None
-    steps: int
+    steps: int  # number of steps that the table is for, at least as many as rows
 
 
 def tabulate(setpoints: Sequence[Setpoint], rack_per_steering_wheel_m: float | None) -> SetpointTable:

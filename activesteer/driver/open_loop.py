@@ -15,19 +15,7 @@ _STANDSTILL_MPS: Final = 0.05
 
 
 class SpeedHold(NativeBlock):
-    """Speed control by drive torque and engine braking.
-
-    The integral is frozen while a limit is active.
-
-    A negative speed engages the reverse gear: the engine then drives backwards and brakes forwards.
-
-    If the driven wheels are too fast for the speed of the car, they spin. The driver releases the accelerator while
-    they spin, and presses it again slowly when they roll.
-
-    Attributes:
-        drive: Engine and gearbox.
-        saturated: Whether the last step reached a limit of the engine or released the accelerator.
-    """
+    """Speed control by drive torque and engine braking; a negative speed engages the reverse gear."""
 
     _gain_Nmspm: float
     _integral_gain_Nmpm: float
@@ -80,6 +68,8 @@ def drive_torque(
     gear = 1 if speed_demand_mps >= 0.0 else -1
     error = speed_demand_mps - speed
     torque = hold._gain_Nmspm * error + hold._integral_Nm
+    # Driven wheels that are too fast for the car spin. The driver releases the accelerator while they spin, and presses
+    # it again slowly when they roll.
     overspeed = gear * (engine_radps * hold._wheel_radius_m - speed)
     spins = overspeed > hold._spin_mps + hold._spin_slip * abs(speed)
     if spins or hold._pedal < 1.0:
@@ -99,6 +89,7 @@ def drive_torque(
         hold.saturated = True
         return low
     hold.saturated = False
+    # The integral is frozen while a limit is active.
     hold._integral_Nm += hold._integral_gain_Nmpm * error * hold._timestep_s
     return torque
 
@@ -213,11 +204,7 @@ _MIN_SPEED_MPS: Final = 1.0
 
 
 class ConstantRadiusDriver(NativeBlock):
-    """Steering by curvature: Ackermann angle, and the integral of the curvature error.
-
-    The measured curvature is yaw rate over speed: the curvature of the path while the sideslip angle is constant. The
-    integral is frozen while the steering wheel is at its stop.
-    """
+    """Steering by curvature: Ackermann angle, and the integral of the curvature error."""
 
     _wheelbase_m: float
     _fraction: float
@@ -252,5 +239,6 @@ def circle_angle(block: ConstantRadiusDriver, robot: OpenLoopDriver, curvature_1
 @shared
 def correct_circle(block: ConstantRadiusDriver, curvature_1pm: float, yaw_rate_radps: float, speed_mps: float) -> None:
     """Integrate the curvature error while the steering wheel is not at its stop."""
+    # Yaw rate over speed is the curvature of the path while the sideslip angle is constant.
     if speed_mps > _MIN_SPEED_MPS:
         block._correction_1pm += block._fraction * (curvature_1pm - yaw_rate_radps / speed_mps)

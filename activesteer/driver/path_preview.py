@@ -30,8 +30,7 @@ from activesteer.native.shared_laws import shared
 from activesteer.road.native_path import PathSearch, nearest, point_at
 
 LateralModel = Callable[[float], tuple[Array, Array]]
-"""Function from speed [m/s] to system matrix (2, 2) and input matrix (2, k). The states are yaw rate [rad/s] and
-sideslip angle [rad]. The first input is the front steer angle [rad]."""
+"""Function from speed [m/s] to matrices (2, 2), (2, k) of yaw rate and sideslip; the first input is the front angle."""
 
 PREVIEW_INTERVAL_S: Final = 0.01
 """Time between two looks at the road [s]; short compared with delay and lag."""
@@ -50,22 +49,13 @@ _LEAST_LAG_S: Final = 1e-3
 
 
 class SteeringGains(NamedTuple):
-    """Preview gains of the steering wheel angle.
-
-    Attributes:
-        per_yaw_rate_s: Gain of the yaw rate [rad/(rad/s)].
-        per_sideslip: Gain of the sideslip angle [-].
-        per_angle: Gain of the steering wheel angle [-].
-        per_waiting: Gains of the decisions that wait, the newest first [-], shape (m,).
-        per_path_radpm: Gains of the distance of the path to the left of the line straight ahead, at the car and at
-            every future look within the preview [rad/m], shape (n,).
-    """
+    """Preview gains of the steering wheel angle."""
 
     per_yaw_rate_s: float
     per_sideslip: float
     per_angle: float
-    per_waiting: Array
-    per_path_radpm: Array
+    per_waiting: Array  # of decisions, the newest first, shape (m,)
+    per_path_radpm: Array  # of the path's distance to the left of the line straight ahead, now and at later looks
 
 
 class PathPreviewDriver(NativeBlock):
@@ -114,11 +104,7 @@ class PathPreviewDriver(NativeBlock):
         self._steps = 0
 
     def gains_at(self, rounded: int) -> Array:
-        """Return the gains at a rounded speed in one row, stored for compiled code.
-
-        Args:
-            rounded: Speed in steps of `SPEED_STEP_MPS`.
-        """
+        """Return the gains at a speed in steps of `SPEED_STEP_MPS`, in one row, stored for compiled code."""
         row = self._gains.get(rounded)
         if row is None:
             gains = steering_gains(rounded * SPEED_STEP_MPS, self._model, self._parameters, self.robot.steering_ratio)
@@ -163,11 +149,7 @@ def look(
     block, limit_rad, decided, x, y, yaw, speed, lateral_speed, yaw_rate,
     spacing, xs, ys, heading_first, heading_last, gains,
 ):  # fmt: skip
-    """Look at the path ahead, decide on a steering wheel angle, and apply the next pending decision.
-
-    The arguments are: the `PathPreviewDriver`, the lock angle [rad], the earlier decisions, the members of `Motion` and
-    of `PathSearch.line`, and `PathPreviewDriver.gains_at` the speed, if the driver looks.
-    """
+    """Look at the path ahead, decide on a steering wheel angle, and apply the next pending decision."""
     if looks(speed):
         path = 2 + len(decided)  # as many gains as decisions that wait, behind the first three
         along, angle = _decide(
@@ -206,11 +188,7 @@ def _decide(
     around, spacing, xs, ys, heading_first, heading_last,
     decided, wheel, per_yaw_rate, per_sideslip, per_angle, per_waiting, per_path,
 ):  # fmt: skip
-    """Return the arc length of the car along the path [m], and the driver's next steering wheel angle [rad].
-
-    The arguments are: the members of `Motion`; the last arc length [m] and the members of `PathSearch.line`; the
-    earlier decisions, the newest first, and the steering wheel angle [rad]; and the members of `SteeringGains`.
-    """
+    """Return the arc length of the car along the path [m], and the driver's next steering wheel angle [rad]."""
     along = nearest(x, y, around, _WINDOW_M, spacing, xs, ys, heading_first, heading_last)
     cos, sin = math.cos(yaw), math.sin(yaw)
     angle = per_yaw_rate * yaw_rate + per_sideslip * math.atan2(lateral_speed, speed) + per_angle * wheel

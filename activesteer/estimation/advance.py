@@ -52,32 +52,27 @@ from activesteer.native.compilation import compiled, inlined
 
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the current time [s]."""
+# Used friction: acceleration over the largest one that the tyres allow on the road of their files; the largest is
+# forgotten with `friction_s`. Only forces that need a higher friction show one: without the upper bound (at least
+# the assumed friction), front wheels that reach snow before the rear ones were explained by more friction.
 _USED_FRACTION: Final = 0.85
-"""Factor of both bounds of the friction. The lower bound is this fraction of the used friction: the acceleration,
-relative to the largest one that the tyres allow on the road of their files. The upper bound is the largest used
-friction, forgotten with `friction_s`, divided by this fraction, or the assumed friction if that is greater: only forces
-that need a higher friction show one. Without it, front wheels that reach snow before the rear ones were explained by
-more friction."""
+"""Friction bounds: used friction times this, largest used friction over this."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
+# Errors are 0.3 to 0.9 on average in ordinary runs, as covariances include errors that last, and 2 to 5 for 0.1 s where
+# wheels reach snow. The second number was chosen from 6, 10 and 16 by the share of the samples with the true friction
+# inside two deviations, on 112 recordings (comparison, seed 9).
 _EXPLAINED: Final = 1.5
 _UNEXPLAINED: Final = 6.0
-"""The squared errors over their covariances, minus the first number, are summed up, and the sum is never below 0. If
-the sum exceeds the second number, the car has reached another road. In ordinary runs these errors are 0.3 to 0.9 on
-average, since the covariances include errors that last. Where wheels reach snow they are 2 to 5 for 0.1 s. The second
-number was chosen from 6, 10 and 16 by the share of the samples with the true friction inside two deviations, on 112
-recordings (comparison, seed 9)."""
-_SHOWING_MPS2: Final = 2.0
-"""Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2].
-With 1 m/s2 a curve with a bank of 4 deg was mistaken for snow."""
-_SHOWING_USED: Final = 0.5
-"""Fraction of the friction in the filter from which errors show that this friction is wrong, if this limit is below
-`_SHOWING_MPS2`. Without it, a filter that was sure of ice stayed lost for a second. The first value that was tried."""
-_SLIDING_SLIP: Final = 0.05
+"""Squared errors over covariances, minus the first, add up to at least 0; a sum beyond the second: another road."""
+_SHOWING_MPS2: Final = 2.0  # with 1 m/s2 a curve with a bank of 4 deg was mistaken for snow
+"""Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2]."""
+_SHOWING_USED: Final = 0.5  # first value tried; without it, a filter that was sure of ice stayed lost for a second
+"""Fraction of the filter's friction from which errors show that it is wrong, if lower than `_SHOWING_MPS2`."""
+_SLIDING_SLIP: Final = 0.05  # of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow
 _SLIDING_USED: Final = 0.95
 _SLIDING_MPS2: Final = 1.0
-"""Slip of a wheel at its limit, in the brush model at 3 u / c: 5 % on snow; fraction of the friction that a car with
-sliding wheels uses; least deceleration [m/s2]."""
+"""Least slip of a sliding wheel, fraction of the friction that a car then uses, least deceleration [m/s2]."""
 _ALIKE: Final = 0.6
 """Ratio of the used friction of both sides below which the road has two frictions, and one number is wrong."""
 

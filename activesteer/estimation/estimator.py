@@ -47,13 +47,7 @@ class Estimator(NativeBlock):
     _line: Array
 
     def __init__(self, setup: EstimatorSetup, parameters: EstimatorParameters, timestep_s: float) -> None:
-        """Create the estimator of one run.
-
-        Args:
-            setup: The known car and its sensors.
-            parameters: Uncertainties of the model.
-            timestep_s: Time between two steps [s].
-        """
+        """Create the estimator of one run for a known car, uncertainties of the model and a time between steps [s]."""
         self._known = known_of(setup, parameters, timestep_s)
         self._tyres = np.array([tyre.force_N for tyre in setup.tyres]).reshape(2, *GRID)
         self._memory, self._said = np.zeros(1, MEMORY), np.zeros(len(SAID))

@@ -79,27 +79,26 @@ from activesteer.native.compilation import compiled, inlined
 
 _DIFFERENCES: Final = np.array([0.01, 0.001, 5e-4, 5e-4, 5e-4, 5e-4, 1.0, 1.0, 1.0, 0.01, 0.01, 0.01, 0.01])
 """Steps of the differences, in the units of the states."""
+# Brakes or motors reduce the lateral forces by more than `force_fraction`, by a friction circle that is not exact.
 _MOST_BRAKED: Final = 0.25
-"""Fraction of the front axle's friction force above which lateral forces give no information on friction and stiffness:
-brakes or motors then reduce them by more than `force_fraction`, by a friction circle that is itself not exact."""
+"""Front longitudinal force over friction force above which lateral forces show neither friction nor stiffness."""
+# Three times the 0.05 to 0.10 deg RMS that bump steer and roll cause on a straight road of class C (compact, sedan),
+# which the model does not know.
 _LEAST_SLIP_RAD: Final = math.radians(0.3)
-"""Slip angle of an axle below which its stiffness is not estimated. On a straight road of class C, bump steer and roll
-cause slip angles of 0.05 to 0.10 deg RMS (compact, sedan), which the model does not know. This limit is three times as
-large."""
+"""Slip angle of an axle below which its stiffness is not estimated."""
+# Two standard deviations: something else has then changed. At the edge of snow, one sample moved the offset by 0.34
+# m/s2, six of its deviations, and the friction behind was too low by 0.1. In a slalom on snow, errors of eleven
+# deviations moved the lateral speed by 0.7 m/s in 0.1 s.
 _SURPRISING: Final = 4.0
-"""Squared error over its expected variance above which a value is not used for the stiffness and for the offset of the
-accelerometer: two standard deviations. Something else has then changed. At the edge of snow, one sample moved the
-offset by 0.34 m/s2, six of its standard deviations. The friction behind the snow was then too low by 0.1. In a slalom
-on snow, errors of eleven standard deviations moved the lateral speed by 0.7 m/s in 0.1 s."""
+"""Squared error over its variance above which a value does not change stiffness and accelerometer offset."""
+# For a tenth of a second one axle is still on the old road. From 0.1, 0.2, 0.3, by the error of the sideslip angle.
 _NEW_RATIO_STD: Final = 0.3
-"""Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road: for a tenth of a
-second one axle is still on the old one. Chosen from 0.1, 0.2 and 0.3 by the error of the sideslip angle."""
-SLIDING_S: Final = 0.3
-"""Time for which a wheel that has slid counts as sliding, and duration of the error of the friction that it shows [s]:
-three cycles of the anti-lock system."""
+"""Standard deviation of the friction of the rear tyres relative to the front tyres, on a new road."""
+SLIDING_S: Final = 0.3  # three cycles of the anti-lock system
+"""Time for which a wheel that has slid counts as sliding, and duration of the error of its friction [s]."""
+# In braked turns with an anti-lock system, the wheels of two cars used 83 to 101 % of their friction (median).
 _SLIDING_STD: Final = 0.15
-"""Relative standard deviation of this friction. In braked turns with an anti-lock system, the wheels of two cars used
-83 to 101 % of their friction (median over a run)."""
+"""Relative standard deviation of this friction."""
 _CREEP_MPS: Final = 0.05
 """Standard deviation of the lateral speed of an almost standing car [m/s]."""
 _CREEP_DENSITY: Final = 0.05
@@ -268,11 +267,7 @@ def _over_friction(known, tyres, memory, here_mps2):
 
 @inlined
 def _take_in(state, covariance, row, error, variance):
-    """Process one measured value, and return the expected variance of its error.
-
-    A stiffness without a slip angle that shows it, or an offset that would have to jump, has no gain; its uncertainty
-    counts (Schmidt's filter). A surprise moves other states that cannot jump by a limited amount.
-    """
+    """Process one measured value, and return the expected variance of its error."""
     n = len(state)
     spread, expected = np.zeros(n), variance
     for i in range(n):
@@ -280,6 +275,7 @@ def _take_in(state, covariance, row, error, variance):
             spread[i] += covariance[i, k] * row[k]
     for i in range(n):
         expected += row[i] * spread[i]
+    # The uncertainty of states without gain counts (Schmidt's filter); a surprise has a limited effect on others.
     surprise = error * error / (_SURPRISING * expected)
     used = np.ones(n)
     if surprise > 1.0:
@@ -300,12 +296,7 @@ def _take_in(state, covariance, row, error, variance):
 
 @compiled
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
-    """Update state and covariance with a measurement after an interval.
-
-    Returns:
-        Squared error of both values over its expected covariance, chi-square distributed with two degrees of freedom,
-        and the part of the yaw rate, with one.
-    """
+    """Take in a measurement; return its normalised squared error (chi-square, 2 degrees) and the yaw rate's (1)."""
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from activesteer.config import Range
-from activesteer.core.conventions import GRAVITY_MPS2
+from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.theory.single_track import SingleTrackParameters, TwoTrackParameters
 
 _Positive = Annotated[float, Range(1e-9)]
@@ -104,49 +104,32 @@ GRID: Final = (10, 41)
 
 @dataclass(frozen=True)
 class KnownTyre:
-    """Tyre in the model of the estimator: new, upright, on the road of its file.
-
-    Attributes:
-        slip_angle_step_rad: Step of the slip angles of the grid, from 0 [rad].
-        load_step_N: Step of its loads, from 0 [N].
-        force_N: Lateral force for each load and slip angle of `GRID`, mean of both directions, without sign [N].
-        relaxation_length_m: Relaxation length of the slip angle under the static load [m].
-        slip_stiffness: Longitudinal force per slip and load, under the static load.
-        rolling_radius_m: Effective rolling radius under the static load [m].
-    """
+    """Tyre in the model of the estimator: new, upright, on the road of its file."""
 
     slip_angle_step_rad: float
     load_step_N: float
-    force_N: tuple[tuple[float, ...], ...]
+    force_N: tuple[tuple[float, ...], ...]  # by load and slip angle of `GRID`, mean of both directions, without sign
     relaxation_length_m: float
-    slip_stiffness: float
+    slip_stiffness: float  # longitudinal force per slip and load, as all three under the static load
     rolling_radius_m: float
+
+    @property
+    def loads_N(self) -> Array:
+        """Loads of the grid [N]."""
+        return self.load_step_N * np.arange(len(self.force_N), dtype=np.float64)
 
     def stiffness_at(self, load_N: float) -> float:
         """Return the cornering stiffness under a load [N/rad]."""
-        loads_N = self.load_step_N * np.arange(len(self.force_N))
-        return float(np.interp(load_N, loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
+        return float(np.interp(load_N, self.loads_N, np.array(self.force_N)[:, 1])) / self.slip_angle_step_rad
 
     def most_N(self, load_N: float) -> float:
         """Return the largest lateral force under a load [N]."""
-        loads_N = self.load_step_N * np.arange(len(self.force_N))
-        return float(np.interp(load_N, loads_N, np.array(self.force_N).max(axis=1)))
+        return float(np.interp(load_N, self.loads_N, np.array(self.force_N).max(axis=1)))
 
 
 @dataclass(frozen=True)
 class EstimatorSetup:
-    """Input for the creation of an estimator.
-
-    Attributes:
-        single_track: Mass, yaw inertia, axle distances and axle stiffnesses.
-        two_track: Parameters of wheel loads and body roll.
-        steering_ratio: Steering wheel angle over road-wheel angle [-].
-        tyres: Tyre of the front and of the rear axle.
-        drive_fractions: Fraction of the drive torque at each wheel, in the order of `CORNERS`.
-        brake_torque_per_pressure_NmpPa: Brake torque per pressure of each wheel [Nm/Pa].
-        drag_per_speed2_kgpm: Drag over the square of the speed [kg/m].
-        sensors: Data sheets of the sensors.
-    """
+    """Input for the creation of an estimator."""
 
     single_track: SingleTrackParameters
     two_track: TwoTrackParameters

@@ -65,11 +65,11 @@ LARGEST_STIFFNESS: Final = 2.0
 """Bounds of the estimated stiffness of the tyres relative to new tyres [-]."""
 SLOWEST_MPS: Final = 3.0
 """Speed below which the car is assumed to roll without slip angles, which the sensors cannot show [m/s]."""
+# By the compact's Magic Formula, at 1 to 6 deg, 0.65 to 0.72 of the lateral force remain at a slip of 12 %, where the
+# brake force is largest. At 20 %, which an anti-lock system allows at times, 0.45 to 0.53 remain. The circle with one
+# half leaves 0.92 to 0.51.
 _LEAST_LEFT: Final = 0.5
-"""Smallest fraction of its friction that a wheel keeps for lateral force, for any longitudinal force. By the compact's
-Magic Formula, at 1 to 6 deg, 0.65 to 0.72 of the lateral force remain at a slip of 12 %, where the brake force is
-largest. At 20 %, which an anti-lock system allows at times, 0.45 to 0.53 remain. The circle with one half leaves 0.92
-to 0.51."""
+"""Smallest fraction of its friction that a wheel keeps for lateral force, for any longitudinal force."""
 _CREEP_S: Final = 0.3
 """Time constant of the yaw rate of an almost standing car [s]."""
 _LONGEST_STEP_S: Final = 0.005
@@ -91,20 +91,9 @@ def _between(forces_N, angle_step_rad, load_step_N, angle_rad, load_N):
 
 @compiled
 def axle_force(forces_N, angle_step_rad, load_step_N, angle_rad, load_N, shift_N, left_N, right_N, friction, stiffness):
-    """Return the lateral force of both tyres of an axle [N].
-
-    Args:
-        forces_N: The tyre's grid.
-        angle_step_rad: Step of its slip angles.
-        load_step_N: Step of its loads.
-        angle_rad: Slip angle; a positive angle gives a positive force.
-        load_N: Mean load of both wheels.
-        shift_N: Load transfer from the left to the right wheel.
-        left_N: Longitudinal force of the left wheel.
-        right_N: Longitudinal force of the right wheel.
-        friction: Friction of the road.
-        stiffness: Stiffness of the tyres relative to new ones.
-    """
+    """Return the lateral force of both tyres of an axle [N], positive for a positive slip angle."""
+    # `load_N` is the mean load of both wheels, `shift_N` the load transfer from the left to the right wheel. `left_N`
+    # and `right_N` are longitudinal forces, and `stiffness` is relative to new tyres.
     size_rad, total_N = min(max(stiffness, LEAST_STIFFNESS), LARGEST_STIFFNESS) * abs(angle_rad) / friction, 0.0
     for sign, along_N in ((-1.0, left_N), (1.0, right_N)):
         own_N = max(load_N + sign * shift_N, 0.0)
@@ -179,10 +168,7 @@ def follow(known, tyres, memory, state, duration_s, out):
 
 @compiled
 def follow_roll(known, memory, ay_mps2, duration_s):
-    """Advance the roll of the body by an interval, and compute the load transfer by springs and dampers.
-
-    Springs and dampers carry (p + 2 D p' / w) / k in place of a_y.
-    """
+    """Advance the roll and the load transfer: springs and dampers carry (p + 2 D p' / w) / k in place of a_y."""
     speed, damping, gradient = known.roll_speed_radps, known.roll_damping, known.roll_gradient_radpmps2
     steps = max(1, math.ceil(duration_s / _LONGEST_STEP_S - 1e-9))
     dt = duration_s / steps

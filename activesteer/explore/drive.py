@@ -87,18 +87,14 @@ COURSES: Final = {
 
 
 class HandDriver:
-    """A driver that follows the steering and pedal inputs of a person at the page.
-
-    The hands turn the wheel at a limited rate towards the angle asked for. Full steering is the angle of a steady turn
-    at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio, and at most the lock. Without a foot on
-    a pedal, the driver holds the speed `hold_mps`, or coasts if it is None. `hands` is what is asked for now.
-    """
+    """A driver that follows steering and pedal inputs of a person, who steers at a limited rate."""
 
     def __init__(self, setup: DriverSetup, hold_mps: float | None) -> None:
         """Store the car, and start with straight wheels and released pedals."""
         car = setup.single_track
+        # `hands` is what is asked for now. Without a foot on a pedal, the driver holds `hold_mps`, or coasts if None.
         self.hands, self.hold_mps = Act(steer=0.0), hold_mps
-        self._wheelbase_m = car.cg_to_front_m + car.cg_to_rear_m
+        self._wheelbase_m = car.wheelbase_m
         # A car that does not understeer has no characteristic speed.
         self._understeer_s2pm2 = 1.0 / car.characteristic_speed_mps**2 if car.characteristic_speed_mps else 0.0
         self._setup, self._angle_rad, self._throttle, self._brake = setup, 0.0, 0.0, 0.0
@@ -106,6 +102,7 @@ class HandDriver:
 
     def full_turn_rad(self, speed_mps: float) -> float:
         """Return the steering wheel angle of full steering at a speed [rad]."""
+        # The angle of a steady turn at `_FASTEST_MPS2`, a (l / v^2) (1 + (v / v_ch)^2) times the steering ratio.
         square = max(speed_mps * speed_mps, 1.0)
         turn = _FASTEST_MPS2 * self._wheelbase_m * (1.0 / square + self._understeer_s2pm2)
         return min(self._setup.steering_ratio * turn, self._setup.steering_wheel_limit_rad)

@@ -99,12 +99,8 @@ def read(text: str | bytes) -> Message:
 
 
 def add(waiting: deque[Message], message: Message) -> bool:
-    """Append a message to a queue, or replace an older message with the same meaning.
-
-    Return False if it is full.
-
-    Beginning and end of a drive are always taken: they make older hands useless.
-    """
+    """Append a message, or replace an older one with the same meaning; return False if the queue is full."""
+    # Beginning and end of a drive are always taken: they make older hands useless.
     if isinstance(message, (Start, End)):
         useless = (Act, End) if isinstance(message, End) else (Act, End, Start)
         for older in [other for other in waiting if isinstance(other, useless)]:

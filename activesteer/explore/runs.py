@@ -329,11 +329,9 @@ class Runs:
         return self._limits_of[1]
 
     def _held(self, choice: RunRequest, overrides: dict[str, float]) -> tuple[Scenario, dict[str, float], str, str]:
-        """Return a scenario with its amplitude, its overrides, words for its title, and a note for the reader.
-
-        While a slider moves, the amplitude comes from the last search, else from a new one. If a new search fails, the
-        amplitude stays, and becomes an override.
-        """
+        """Return a scenario with its amplitude, its overrides, words for its title, and a note for the reader."""
+        # While a slider moves, the amplitude comes from the last search, else from a new one. If a new search fails,
+        # the amplitude stays, and becomes an override.
         scenario, key = self._resolved(choice, overrides), (choice.maneuver, choice.vehicle)
         if choice.dragging and key in self._held_rad:
             found = with_amplitude_found(scenario, angle_rad=self._held_rad[key])

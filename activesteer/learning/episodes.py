@@ -329,10 +329,7 @@ class Episodes:
         return np.clip(actions, self._low, 1.0)
 
     def commands(self, actions: Array) -> tuple[DriverCommand | None, ActuatorCommand]:
-        """Convert bounded actions to commands of driver and controller.
-
-        Each field is an array of length n, or zero. There is no command of the driver if the agent does not drive.
-        """
+        """Convert bounded actions to commands, arrays of length n or zeros; no driver command without an agent."""
         columns: dict[str, Any] = {
             name: scale * actions[:, place] for place, (name, _, scale) in enumerate(self.actions)
         }

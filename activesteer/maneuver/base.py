@@ -162,12 +162,7 @@ def check_speed(speed_mps: float, needing: str, instead: str = "", least_mps: fl
 def read_columns(
     path: Path, required: Sequence[str], optional: Sequence[str] = ()
 ) -> tuple[dict[str, list[float]], list[int]]:
-    """Read required and optional columns of a CSV file with a header.
-
-    Other columns are ignored.
-
-    A column may be in degrees or km/h, as in a TOML file: `steering_wheel_deg` fills `steering_wheel_rad`.
-    """
+    """Read required and optional columns of a CSV file with a header; a key in degrees or km/h fills its SI key."""
     rows = read_csv(path, ManeuverError)
     if not rows:
         raise ManeuverError("is empty; its first line must name the columns", file=path.name, line=1)
@@ -248,11 +243,9 @@ _ROAD_FILES: Final = (
 def with_files(
     kind: type[Maneuver], table: Mapping[str, Any], folder: Path | None, source: Source
 ) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Insert the values of the files into a table, and return the CSV files for the recording.
-
-    A table without a file has no `folder`, and may have both the name of a file and values. It comes from a recording,
-    and the values are those that were read then, unless an override names another file.
-    """
+    """Insert the values of the files into a table, and return the CSV files for the recording."""
+    # A table without a file has no `folder`. It comes from a recording, and may have both the name of a file and the
+    # values that were read then, unless an override names another file.
     filled, files = dict(table), {}
     for key, fills, read, kept in (*kind.FILES, *_ROAD_FILES):
         *above, last = key

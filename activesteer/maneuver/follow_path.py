@@ -106,13 +106,7 @@ def _read_points(file: FilePath) -> dict[str, Any]:
 
 
 class PathSpeed:
-    """Setpoints of one run along a path with speeds.
-
-    Attributes:
-        maneuver: The manoeuvre.
-        present: Last setpoint.
-        began: Phases that have begun; a path has none.
-    """
+    """Setpoints of one run along a path with speeds; a path has no phases."""
 
     def __init__(self, maneuver: Maneuver, path: Path, speed_mps: Array) -> None:
         self.maneuver, self.present = maneuver, maneuver.setpoint(0.0)

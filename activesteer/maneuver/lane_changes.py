@@ -103,10 +103,7 @@ _CONE_SPACING_M: Final = 5.0
 
 
 def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane, ...]:
-    """Return entry, side and exit lane.
-
-    The centre line of the entry lane is y = 0. The side is 1 for a side lane on the left, -1 on the right.
-    """
+    """Return entry lane, about y = 0, side lane and exit lane; side 1 is a side lane on the left, -1 on the right."""
     b = vehicle_width_m
     entry = 1.1 * b + 0.25
     # Name, start, length, width, and offset of the centre line [m].
@@ -132,10 +129,7 @@ def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Return the points where cones touch the edges of lanes, at both ends and at most 5 m apart.
-
-    By the standards the edges of a lane are tangents to the feet of its cones.
-    """
+    """Return points at most 5 m apart along lane edges, by the standards tangents to the feet of the cones."""
     points: list[tuple[float, float]] = []
     for lane in course:
         gaps = math.ceil((lane.end_x_m - lane.start_x_m) / _CONE_SPACING_M)

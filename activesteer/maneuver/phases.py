@@ -193,13 +193,7 @@ class Phases(Maneuver, kind="phases"):
 
 
 class PhaseSequence:
-    """The phases of one run.
-
-    Attributes:
-        began: Time and name of each phase that has begun.
-        moved: Whether the last call began a phase.
-        present: Last setpoint.
-    """
+    """The phases of one run, with time and name of each phase that has begun."""
 
     def __init__(self, maneuver: Phases) -> None:
         """Begin with the first phase at time zero."""
@@ -248,10 +242,7 @@ class PhaseSequence:
         return self.maneuver.phases[self._number % len(self.maneuver.phases)]
 
     def setpoint(self, time_s: float, seen: Sequence[float]) -> Setpoint:
-        """Return the setpoint for the driver, and start the next phase if the current one has ended.
-
-        It is the setpoint at a time [s] and a state of the car, in the order of `Seen`.
-        """
+        """Return the setpoint at a time [s] and a state (`Seen`), and start the next phase when it is due."""
         self.moved = False
         maneuver, until, elapsed_s = self.maneuver, self._phase.until, time_s - self._begin_s
         sign = SIGNS[maneuver.direction]

@@ -51,11 +51,7 @@ def judged(
     file: MeasuredFile, nominal_deg: float, assumed_deg: float, ends: Sequence[tuple[str, str, float, float]],
     distributions: Sequence[Array],
 ) -> CircleValidation:  # fmt: skip
-    """Compare the distributions of measured and predicted angles.
-
-    The second prediction, `assumed_deg`, is without the overrides of `circle.prediction`; the intervals start from it.
-    `ends` has name and source of each interval, and the second prediction at its ends, the smaller angle first.
-    """
+    """Compare measured angles with the prediction, and with `assumed_deg` without overrides and at interval ends."""
     from scipy.stats import gaussian_kde, wasserstein_distance  # noqa: PLC0415 - slow to import
 
     measured, samples, lower, upper = distributions

@@ -207,8 +207,7 @@ would attribute to the car."""
 
 
 FitProgress = Callable[[int, int, int, float], None]
-"""Callback that receives the number of the tried set, its finished runs and all its runs, and the least misfit so far
-(nan before the first)."""
+"""Callback with the number of the tried set, finished and all runs of it, and least misfit (nan before the first)."""
 
 
 def fit(

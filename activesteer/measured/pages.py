@@ -65,10 +65,7 @@ def _shift(shift_s: float) -> str:
 def picture(
     found: Compared, standard: str = "iso19365", runs: int = 1, areas: Sequence[Area] = (), start: Array | None = None
 ) -> Picture:
-    """Return the plots of a channel: overlay with its corridor, and residual.
-
-    `start` has the simulated values at the start of a fit.
-    """
+    """Return the plots of a channel: overlay with its corridor and the start of a fit, and residual."""
     across = standard == "iso19364"
     x_label = "lateral acceleration [m/s²]" if across else "time of the simulation [s]"
     shown = quantity_of(found.channel)

@@ -64,11 +64,7 @@ def is_time(name: str) -> bool:
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> tuple[str, str, float, bool] | None:
-    """Return the channel that the name of a column stands for, or None.
-
-    That is the channel that it fills, its unit if the file states none, -1 if the exporter uses the sign opposite to
-    ISO 8855, and whether the unit is the exporter's; otherwise SI is assumed.
-    """
+    """Return channel, its unit, -1 for a sign opposite to ISO 8855, and whether the unit is the exporter's, or None."""
     for mark, names in _NAMES["exporters"].items():
         if mark in columns and name in names:
             key = names[name].lstrip("-")

@@ -41,10 +41,8 @@ _PACKAGE: Final = Path(__file__).parents[1]
 
 
 def _import_array_functions() -> None:
-    """Let numba import its array functions without scipy.linalg, whose import is slow.
-
-    numba only checks here whether it exists, and checks again when it compiles something that needs it.
-    """
+    """Let numba import its array functions without scipy.linalg, whose import is slow."""
+    # numba only checks here whether it exists, and checks again when it compiles something that needs it.
     look = getattr(linalg, "ensure_blas", None)
     linalg.ensure_blas = lambda: None
     try:
@@ -57,10 +55,7 @@ _import_array_functions()
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Return a decorator that compiles a function at its first call and keeps the native code on disk.
-
-    Division by zero follows IEEE 754, as in numpy, and does not raise.
-    """
+    """Return a decorator that compiles and stores a function, with division by zero by IEEE 754, as in numpy."""
     _know_shared()
     dispatcher: Any = njit(error_model="numpy")(function)
     if hasattr(dispatcher, "enable_caching"):  # a plain function where numba is switched off
@@ -102,10 +97,7 @@ def compiled_callback(result: types.Type, *arguments: types.Type) -> Callable[[C
 def compiled_call(
     result: types.Type, *arguments: types.Type, others_run: bool = True, about: tuple[str, Path] | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles a function to native code with one signature.
-
-    Call it from Python only, with positional arguments; it does not inspect their types first.
-    """
+    """Return a decorator that compiles one signature, to call from Python with positional arguments of these types."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         _know_shared()
@@ -130,10 +122,7 @@ def address_of(call: Any) -> int:
 
 
 def call_at(result: types.Type, *arguments: types.Type) -> Any:
-    """Return an intrinsic that calls a `compiled_call` at an address.
-
-    The caller does not contain the code that it calls, so neither is compiled again when the other changes.
-    """
+    """Return an intrinsic that calls a `compiled_call` at an address, so that caller and callee compile separately."""
 
     @intrinsic
     def call(_typing_context, address, given):

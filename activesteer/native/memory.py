@@ -97,11 +97,8 @@ _TYPES: Final = {0: _IGNORED, 1: types.float64}
 
 
 def native_type(message: type[Any]) -> types.Tuple:
-    """Return the numba type of a message from Python.
-
-    Every number is converted to float64. Check class and length of a message first: one that is too short ends the
-    process.
-    """
+    """Return the numba type of a message from Python, whose numbers become float64."""
+    # Check class and length of a message first: one that is too short ends the process.
     widths = widths_of(message)
     return types.Tuple([_TYPES.get(width) or types.UniTuple(types.float64, width) for width in widths])
 
@@ -139,8 +136,7 @@ N_COMMAND: Final = len(numbers_of(ActuatorCommand))
 N_HELD: Final = N_COMMAND + len(Estimate._fields) + 1
 """Numbers of a decision: the command, its estimate, and 1 if there is an estimate."""
 CALL: Final = (types.intp, types.intp, types.intp, types.intp)
-"""Arguments of a law: addresses of its block, of the numbers of a `DriverCommand` and of a `Measurement`, and of the
-`N_HELD` numbers to write."""
+"""Addresses of a law's block, numbers of `DriverCommand` and `Measurement`, and `N_HELD` numbers to write."""
 assert [number.name for number in numbers_of(ActuatorCommand)[:N_STEERING]] == [
     "rear_steer_demand_rad", "superposition_demand_rad", "yaw_rate_desired_radps", "prediction_rad", "correction_rad",
     "saturated",

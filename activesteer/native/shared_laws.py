@@ -1,9 +1,4 @@
-"""Mark of the functions that Python and compiled code share.
-
-`compilation` registers them for compiled code.
-
-The mark needs no compiler, so that lists of controllers and the help do without one.
-"""
+"""Mark of the functions that Python and compiled code share, without the compiler that registers them."""
 
 from __future__ import annotations
 
@@ -17,22 +12,13 @@ MARKED: Final[list[Callable[..., Any]]] = []
 
 
 def shared(function: _Function) -> _Function:
-    """Decorate a Python function that compiled code may call.
-
-    Python still calls it as is.
-
-    The function is the law of a block. Its first argument is the block itself in Python, and a record of the block's
-    attributes in compiled code; see `native.records`.
-    """
+    """Decorate a Python function, the law of a block, that compiled code may call with a record of the block."""
     MARKED.append(function)
     return function
 
 
 def law_of(kind: type[Any]) -> Callable[[_Function], _Function]:
-    """Decorate a function of block, command and measurement as the law of a kind of controller.
-
-    It returns the first fields of an `ActuatorCommand`, and compiled code then carries the controller out.
-    """
+    """Decorate a function of block, command and measurement, returning first fields of `ActuatorCommand`, as a law."""
 
     def decorate(function: _Function) -> _Function:
         kind.law = staticmethod(function)

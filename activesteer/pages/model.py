@@ -23,10 +23,7 @@ _GREY: Final = "#777777"
 
 
 def picture_values(picture: Picture) -> dict[str, Any]:
-    """Return a figure as JSON values.
-
-    A panel without a label of its abscissa, ordinate or without a title has those of its column or row.
-    """
+    """Return a figure as JSON values; a panel without labels or title has those of its column or row."""
     panels = [panel for panel in picture.panels if isinstance(panel, Panel)]
     columns = picture.columns or len(panels)
     shown = []
@@ -132,28 +129,16 @@ def _is_numeric(column: Sequence[str]) -> bool:
 
 
 class Table(NamedTuple):
-    """Table of a page: columns, rows, and their layout.
-
-    Attributes:
-        title: Its title; empty for none.
-        columns: Heads, with units.
-        rows: Cells, as they are read.
-        outside: Numbers of the rows that break a limit.
-        quiet: Numbers of the rows that nothing is asked of.
-        kind: Class of the stylesheet.
-        numbers: Number of columns at the end that hold numbers.
-        folded: Whether a page shows only the title until a reader opens the table. Paper shows up to 100 rows.
-        note: Text below the table.
-    """
+    """Table of a page: columns, rows, and their layout."""
 
     title: str
-    columns: Sequence[str]
+    columns: Sequence[str]  # heads, with units
     rows: Sequence[Sequence[Text]]
-    outside: frozenset[int] = frozenset()
-    quiet: frozenset[int] = frozenset()
-    kind: str = "findings"
-    numbers: int = 0
-    folded: bool = False
+    outside: frozenset[int] = frozenset()  # numbers of the rows that break a limit
+    quiet: frozenset[int] = frozenset()  # numbers of the rows that nothing is asked of
+    kind: str = "findings"  # class of the stylesheet
+    numbers: int = 0  # number of columns at the end that hold numbers
+    folded: bool = False  # a page shows only the title until a reader opens the table; paper shows up to 100 rows
     note: Text = ""
 
     @property
@@ -184,49 +169,27 @@ class Table(NamedTuple):
 
 
 class Section(NamedTuple):
-    """Section of a page: a heading, paragraphs, tables and figures.
-
-    Its parts follow each other in the order of the attributes.
-
-    Attributes:
-        title: Its heading; empty for none.
-        texts: Paragraphs.
-        tables: Tables. They precede the figures, because a reader wants the verdict first.
-        points: Items of a list.
-        pictures: Figures, whose panels the page draws.
-        level: Level of its heading: 2, or 3 for a part of the section before.
-        kind: Class of the list in the stylesheet, or "repeated" for pictures of a table's values, folded on a phone.
-        anchor: Name by which links and the page's own script find the section, which ends with what the script draws.
-    """
+    """Section of a page: heading, paragraphs, tables, list, and figures."""
 
     title: str = ""
     texts: Sequence[Text] = ()
-    tables: Sequence[Table] = ()
-    points: Sequence[Text] = ()
+    tables: Sequence[Table] = ()  # before the figures, because a reader wants the verdict first
+    points: Sequence[Text] = ()  # items of a list
     pictures: Sequence[Picture] = ()
-    level: int = 2
-    kind: str = ""
-    anchor: str = ""
+    level: int = 2  # of its heading: 2, or 3 for a part of the section before
+    kind: str = ""  # class of the list, or "repeated" for pictures of a table's values, folded on a phone
+    anchor: str = ""  # name for links and the page's script; the section ends with what the script draws
 
 
 class Page(NamedTuple):
-    """A page with its head, lead and sections.
+    """A page with its head, lead and sections, the first of which has level 2."""
 
-    Attributes:
-        title: Title of the window.
-        heading: Heading of the page.
-        lead: Paragraphs below the heading.
-        sections: The sections. The first has level 2.
-        scripts: Scripts of this kind of page, in the order in which they run.
-        data: What these scripts draw, as JSON values.
-    """
-
-    title: str
+    title: str  # of the window
     heading: Text
     lead: Sequence[Text]
     sections: Sequence[Section]
-    scripts: Sequence[str] = ()
-    data: Mapping[str, Any] = MappingProxyType({})
+    scripts: Sequence[str] = ()  # in the order in which they run
+    data: Mapping[str, Any] = MappingProxyType({})  # what these scripts draw, as JSON values
 
     def lines(self) -> Iterator[str]:
         """Yield heading, paragraphs and tables as lines."""

@@ -63,10 +63,7 @@ _WIRE_RADIUS_M: Final = 0.007
 
 
 def send_links(stream: rr.RecordingStream, run: ReplayedRun) -> None:
-    """Send every link of the scene whose bodies have poses: rods as cylinders, springs as coils.
-
-    Recordings made before links were recorded show none.
-    """
+    """Send every link of the scene whose bodies have poses: rods as cylinders, springs as coils."""
     names = run.recording.poses.names
     links = [
         part for part in run.recording.scene if isinstance(part, Link) and all(body in names for body, _ in part.points)
@@ -179,10 +176,8 @@ _CUTAWAY_OPACITY: Final = 0.25
 
 
 def send_car(stream: rr.RecordingStream, run: ReplayedRun, *, cutaway: bool = False) -> None:
-    """Send the bodies with their solids, and two level frames that move with the car.
-
-    `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
-    """
+    """Send the bodies with their solids, and two level frames that move with the car."""
+    # `NAME/car_frame` has the heading of the car, and `NAME/chase`, the frame of the camera, the direction of motion.
     poses = run.recording.poses
     when = times(poses.time_s[run.poses])
     for index, body in enumerate(poses.names):

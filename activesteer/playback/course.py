@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import rerun as rr
@@ -39,17 +39,8 @@ _GRIPPY: Final = (44, 44, 46)
 _CONE_SIDES: Final = 12
 
 
-class Extent(NamedTuple):
-    """A rectangle of the road [m]."""
-
-    low_x_m: float
-    high_x_m: float
-    low_y_m: float
-    high_y_m: float
-
-
-def extent(runs: Sequence[ReplayedRun]) -> Extent:
-    """Return the bounding rectangle of the cars and the course."""
+def extent(runs: Sequence[ReplayedRun]) -> tuple[float, float, float, float]:
+    """Return the bounding rectangle of the cars and the course: x from and to, y from and to [m]."""
     points = [_track(run) for run in runs]
     course = _course(runs)
     if course is not None:
@@ -60,16 +51,16 @@ def extent(runs: Sequence[ReplayedRun]) -> Extent:
     low, high = reach.min(axis=0) - 20.0, reach.max(axis=0) + 20.0
     inside = every[((every >= low) & (every <= high)).all(axis=1)]
     (low_x, low_y), (high_x, high_y) = inside.min(axis=0), inside.max(axis=0)
-    return Extent(float(low_x), float(high_x), float(low_y), float(high_y))
+    return float(low_x), float(high_x), float(low_y), float(high_y)
 
 
 def send_road(stream: rr.RecordingStream, runs: Sequence[ReplayedRun]) -> None:
     """Send the road with its grid and its friction patches."""
-    around = extent(runs)
-    low_x = np.floor((around.low_x_m - _BEYOND_M / 2) / _TILE_M) * _TILE_M
-    high_x = np.ceil((around.high_x_m + _BEYOND_M) / _TILE_M) * _TILE_M
-    low_y = np.floor((around.low_y_m - _BESIDE_M) / _TILE_M) * _TILE_M
-    high_y = np.ceil((around.high_y_m + _BESIDE_M) / _TILE_M) * _TILE_M
+    low_x, high_x, low_y, high_y = extent(runs)
+    low_x = np.floor((low_x - _BEYOND_M / 2) / _TILE_M) * _TILE_M
+    high_x = np.ceil((high_x + _BEYOND_M) / _TILE_M) * _TILE_M
+    low_y = np.floor((low_y - _BESIDE_M) / _TILE_M) * _TILE_M
+    high_y = np.ceil((high_y + _BESIDE_M) / _TILE_M) * _TILE_M
     far = (low_x - _HORIZON_M, high_x + _HORIZON_M, low_y - _HORIZON_M, high_y + _HORIZON_M)
     lowest = (
         0.0 if (drawn := surface_in(runs[0].recording.metadata)) is None else min(0.0, float(drawn.z_m.min())) - 0.02
@@ -192,9 +183,8 @@ def _flat(points: Array) -> Array:
 
 def map_bounds(runs: Sequence[ReplayedRun]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the ranges of both map axes that contain all cars and the course [m]."""
-    around = extent(runs)
-    x = (around.low_x_m - _MAP_MARGIN_M, around.high_x_m + _MAP_MARGIN_M)
-    return x, (-around.high_y_m - _MAP_MARGIN_M, -around.low_y_m + _MAP_MARGIN_M)
+    low_x, high_x, low_y, high_y = extent(runs)
+    return (low_x - _MAP_MARGIN_M, high_x + _MAP_MARGIN_M), (-high_y - _MAP_MARGIN_M, -low_y + _MAP_MARGIN_M)
 
 
 def _points(radius: float) -> Any:

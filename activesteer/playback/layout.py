@@ -143,12 +143,6 @@ def send_events(stream: rr.RecordingStream, run: ReplayedRun) -> None:
         stream.send_columns(_warnings_path(run), when, rr.TextLog.columns(text=texts, level=levels))
 
 
-def warnings_view(runs: Sequence[ReplayedRun]) -> list[rrb.TextLogView]:
-    """Return a list with the view of the warnings, empty if no run has any."""
-    paths = [f"/{_warnings_path(run)}" for run in runs if events(run)]
-    return [rrb.TextLogView(origin="/", contents=paths, name="Warnings")] if paths else []
-
-
 def _warnings_path(run: ReplayedRun) -> str:
     return f"{run.name}/warnings"
 
@@ -189,7 +183,12 @@ def _page(run: ReplayedRun, runs: Sequence[ReplayedRun], page: int) -> rrb.Horiz
         rrb.Vertical(
             _chase(run, runs),
             _map(runs),
-            rrb.Horizontal(_above(run, runs), plan_view([run]), _words([run]), column_shares=[6, 5.8, 9.2]),
+            rrb.Horizontal(
+                _car_view(run, runs, "From above", _ABOVE, numbers=False),
+                plan_view([run]),
+                _words([run]),
+                column_shares=[6, 5.8, 9.2],
+            ),
             row_shares=[5, 1.5, 4],
         ),
         rrb.Tabs(
@@ -239,10 +238,6 @@ def _chase(run: ReplayedRun, runs: Sequence[ReplayedRun]) -> rrb.Spatial3DView:
     return _car_view(run, runs, run.label, _BEHIND, numbers=len(runs) == 1)
 
 
-def _above(run: ReplayedRun, runs: Sequence[ReplayedRun]) -> rrb.Spatial3DView:
-    return _car_view(run, runs, "From above", _ABOVE, numbers=False)
-
-
 def _car_view(
     run: ReplayedRun, runs: Sequence[ReplayedRun], name: str, eye: rrb.EyeControls3D, *, numbers: bool
 ) -> rrb.Spatial3DView:
@@ -279,5 +274,7 @@ def _map(runs: Sequence[ReplayedRun]) -> rrb.Spatial2DView:
 def _words(runs: Sequence[ReplayedRun]) -> rrb.Tabs | rrb.TextDocumentView:
     """Return the views of the summary and of the warnings, if there are any."""
     summary = rrb.TextDocumentView(origin=f"/{SUMMARY}", name="Summary")
-    warnings = warnings_view(runs)
-    return rrb.Tabs(summary, *warnings, active_tab=0) if warnings else summary
+    paths = [f"/{_warnings_path(run)}" for run in runs if events(run)]
+    if not paths:
+        return summary
+    return rrb.Tabs(summary, rrb.TextLogView(origin="/", contents=paths, name="Warnings"), active_tab=0)

@@ -117,10 +117,8 @@ def _range(plot: Panel, runs: Sequence[ReplayedRun], beside: int) -> tuple[float
 
 
 def axis_range(low: float, high: float, least: float, most: float) -> tuple[float, float]:
-    """Return an axis range with zero and at least three tick labels in the viewer.
-
-    The viewer labels multiples of one power of ten if they are at least 22 points apart.
-    """
+    """Return an axis range with zero and at least three tick labels in the viewer."""
+    # The viewer labels multiples of one power of ten if they are at least 22 points apart.
     if high - low < least:
         low, high = min(low, -0.5 * least), max(high, 0.5 * least)
     reach = max(high, -low)

@@ -28,11 +28,8 @@ from activesteer.playback.wheel_angles import send_wheel_angles
 
 
 def new_stream(runs: Sequence[ReplayedRun], *, compare: bool) -> rr.RecordingStream:
-    """Return a stream without a target.
-
-    The viewer keeps one layout for each application id while it is open. Another manoeuvre or other runs need another
-    layout, so they have another id.
-    """
+    """Return a stream without a target, with an application id for its manoeuvre and runs."""
+    # The viewer keeps one layout for each application id while it is open. Other runs need another layout.
     maneuver = runs[0].recording.metadata.get("maneuver", {})
     words = ["activesteer", str(maneuver.get("name", "")), *(run.name for run in runs), "compared" if compare else ""]
     # An application id may contain letters, digits, spaces, - and _ only.

@@ -96,9 +96,7 @@ def draw(picture: Picture) -> Figure:
     return figure
 
 
-def save_all(
-    pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str = ""
-) -> list[Path]:
+def save_all(pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str) -> list[Path]:
     """Draw figures and write them as PNG files."""
     directory = make_folder(folder, ParameterError)
     paths = []

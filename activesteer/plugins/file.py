@@ -31,14 +31,8 @@ _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
 
 def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, bytes]]:
-    """Load the file and look up the class or function.
-
-    The file can import modules next to it. Every call loads the file and these modules again.
-
-    Returns:
-        The class or function; the parameters, typed as in TOML; and the contents of the file and of the modules next to
-        it that it imports, by their paths in its folder.
-    """
+    """Load the file; return class or function, typed parameters, and contents of file and imports by path."""
+    # The file can import modules next to it. Every call loads the file and these modules again.
 
     def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:
         return kind.fail(text, problem, value, allowed)

@@ -156,10 +156,7 @@ class Kind:
 
 
 def in_one_line(error: BaseException, files: Collection[str] = ()) -> str:
-    """Describe an error of foreign code in one line, with file and line.
-
-    The place is the last line in one of the user's files, else the last line that is not in a library.
-    """
+    """Describe an error of foreign code in one line, with its last place in the user's files or outside libraries."""
     if isinstance(error, SyntaxError) and error.filename:  # its text names the file and the line
         return _words(error)
     frames = traceback.extract_tb(error.__traceback__)

@@ -100,10 +100,7 @@ class BlockEncoder:
         return len(self._rows.layout)
 
     def _column_stretches(self, layout: FixedMessage) -> list[list[tuple[slice, slice]]]:
-        """Split each run of channel values into pieces from adjacent columns.
-
-        numpy would copy the values first if it were given a list of columns.
-        """
+        """Split each run of channel values into adjacent columns; numpy would first copy a list of columns."""
         stretches: list[list[tuple[slice, slice]]] = []
         runs = iter(layout.runs)
         for group in self._columns:

@@ -359,11 +359,8 @@ ScenePart = Primitive | Link
 
 
 def encode_scene(parts: Iterable[ScenePart]) -> bytes:
-    """Serialise a scene as a foxglove.SceneUpdate.
-
-    Every body with solids becomes an entity that is locked to its frame. A link becomes an entity without a solid, with
-    its points in the metadata: Foxglove has no solid that spans two frames.
-    """
+    """Serialise a scene as a foxglove.SceneUpdate: an entity for each body with solids, and for each link."""
+    # Foxglove has no solid that spans two frames: a link is an entity without a solid, with its points in the metadata.
     update = message_class(SCENE_SCHEMA)()
     entities: dict[str, Any] = {}
     parts = tuple(parts)
@@ -426,11 +423,9 @@ def _new_entity(update: Any, frame: str, name: str) -> Any:
 
 
 def _link_of(table: dict[str, Any]) -> Link:
-    points = []
-    for body, (x_m, y_m, z_m) in table["points"]:
-        points.append((str(body), (float(x_m), float(y_m), float(z_m))))
+    points = tuple((str(body), (float(x_m), float(y_m), float(z_m))) for body, (x_m, y_m, z_m) in table["points"])
     r, g, b, a = (float(value) for value in table["rgba"])
-    return Link(str(table["name"]), str(table["kind"]), tuple(points), float(table["radius_m"]), (r, g, b, a))
+    return Link(str(table["name"]), str(table["kind"]), points, float(table["radius_m"]), (r, g, b, a))
 
 
 def decode_scene(data: bytes) -> tuple[ScenePart, ...]:

@@ -166,19 +166,14 @@ def words_of(error: BaseException) -> str:
 
 
 MAX_LOADED_VALUES: Final = 2**25
-"""Largest number of values that are loaded at once, 256 MiB. Values of a longer recording stay in the file until they
-are needed."""
+"""Largest number of values that are loaded at once, 256 MiB; a longer recording stays in the file until needed."""
 _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
-    """Read a file written by `McapWriter`.
-
-    Return the arguments of `Recording`, and a description of the damage.
-
-    A file that ends too early, as after a killed process, gives all its complete blocks. A damaged file gives the part
-    before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
-    """
+    """Read a file of `McapWriter`; return the arguments of `Recording`, and a description of the damage."""
+    # A file that ends too early, as after a killed process, gives its complete blocks, and a damaged file the part
+    # before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
     descriptor = opened(path)
     kept = False
     try:

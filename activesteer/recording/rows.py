@@ -29,8 +29,7 @@ from activesteer.recording.chunks import Block, BlockDecoder
 MAX_CACHED_BYTES: Final = 3 * 2**27
 """Largest size of the cached channels of all open files together."""
 _READ_BYTES: Final = 2**27
-"""Size of one read operation. Adjacent channels are read together, since any channel requires the whole file to be
-decompressed."""
+"""Size of one read operation, which covers adjacent channels, since any channel needs the whole file decompressed."""
 _SMALL_BYTES: Final = 2**16
 """Size up to which a chunk may be compressed by any ratio."""
 

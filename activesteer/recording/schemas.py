@@ -308,10 +308,7 @@ def state_layout(channels: Iterable[Channel]) -> FixedMessage:
 
 
 def transforms_layout(body_names: Iterable[str]) -> FixedMessage:
-    """Return the layout of `foxglove.FrameTransforms`, where every body is a child of `world`.
-
-    For each body in order, its runs are the timestamp (bytes), the position x y z, and the quaternion x y z w.
-    """
+    """Return the layout of `foxglove.FrameTransforms`: timestamp, x y z, x y z w for each body in `world`."""
     layout = FixedMessage()
     for name in body_names:
         transform = FixedMessage().nested(1, FixedMessage().block("u1", STAMP_LENGTH))

@@ -80,10 +80,7 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
 
 
 def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
-    """Create a locked file that replaces an existing one.
-
-    A process that has opened the old file keeps it, because it is deleted and not changed.
-    """
+    """Create a locked file that replaces an existing one, which a process that has opened it keeps."""
     check_target(path, overwrite=overwrite)
     with writing(path, RecordingError):
         if path.is_file():

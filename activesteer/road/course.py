@@ -42,17 +42,13 @@ _ON_SIDE_M: Final = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Path of the centre of gravity, lanes and cones in the world frame.
-
-    The car starts at the origin, heading along x. Lanes come in the order of travel. `cones_m` holds x and y, shape (n,
-    2); `width_m` the width of the road at the points of the path.
-    """
+    """Path of the centre of gravity, lanes and cones (n, 2) in the world frame, from the origin along x."""
 
     path: Path
     lanes: tuple[Lane, ...] = ()
     cones_m: Array = field(default_factory=lambda: np.empty((0, 2)))
     last_gate_x_m: float | None = None
-    width_m: Array | None = None
+    width_m: Array | None = None  # of the road, at the points of the path
 
     @property
     def first_gate_x_m(self) -> float:
@@ -132,8 +128,7 @@ def _lane(table: object, key: str) -> Lane:
 
 
 FRONT_OVERHANG_M: Final = 0.85
-"""Distance from the front axle to the front end of the body [m]. Usual for the class, since recordings do not hold it.
-"""
+"""Distance from the front axle to the front end of the body [m], usual for the class: recordings do not hold it."""
 REAR_OVERHANG_M: Final = 0.75
 """Distance from the rear axle to the rear end of the body [m]; usual for the class."""
 _RANGE_M: Final = (0.01, 100.0)

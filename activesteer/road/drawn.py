@@ -39,10 +39,8 @@ class DrawnSurface(NamedTuple):
         return {name: np.round(values, 4).tolist() for name, values in self._asdict().items()}
 
     def mesh(self, road: Road) -> tuple[Array, NDArray[np.int64]]:
-        """Return a mesh of the surface: corners in world axes [m], and triangles, anticlockwise from above.
-
-        Each quadrilateral is divided along the diagonal that is nearer to level, so that a skew edge is not jagged.
-        """
+        """Return a mesh of the surface: corners in world axes [m], and triangles, anticlockwise from above."""
+        # Each quadrilateral is divided along the diagonal that is nearer to level, so that a skew edge is not jagged.
         s, d = np.meshgrid(self.s_m, self.d_m, indexing="ij")
         x, y = road.placed(s.ravel(), d.ravel())
         corner = np.arange(s.size).reshape(s.shape)

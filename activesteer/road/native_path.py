@@ -127,11 +127,7 @@ _ON_EARLIER_M: Final = 1.0
 
 
 class PathGrid(NamedTuple):
-    """Arguments of `along_path`: the grid of cells and the path.
-
-    `points` holds x and y of its points in turn, shape (2 n,); `cells` the index of the point nearest to each cell's
-    centre, row by row.
-    """
+    """Arguments of `along_path`: grid of indices of the points nearest to cell centres, and points (x, y in turn)."""
 
     x0_m: float
     y0_m: float
@@ -139,8 +135,8 @@ class PathGrid(NamedTuple):
     columns: int
     rows: int
     spacing_m: float
-    points: Array
-    cells: Array
+    points: Array  # x and y in turn, shape (2 n,)
+    cells: Array  # index of the point nearest to each cell's centre, row by row
 
     @classmethod
     def of(cls, path: Path) -> PathGrid:
@@ -171,12 +167,9 @@ def _direction_at(points, at):
 
 @compiled
 def along_path(x, y, x0, y0, cell, columns, rows, spacing, points, cells):
-    """Return the position along and to the left of a path [m], its direction and its curvature [1/m].
-
-    The direction is that of the tangent, a unit vector. Between two points of the path the direction turns evenly, so
-    that a place moves evenly too. The path continues straight beyond its ends. The other arguments are the fields of
-    `PathGrid`.
-    """
+    """Return the position along and to the left of a path [m], its unit tangent and its curvature [1/m]."""
+    # Between two points of the path the direction turns evenly, so that a place moves evenly too. The path continues
+    # straight beyond its ends.
     column = min(max(int((x - x0) / cell), 0), int(columns) - 1)
     row = min(max(int((y - y0) / cell), 0), int(rows) - 1)
     at, last = int(cells[row * int(columns) + column]), points.size // 2 - 1

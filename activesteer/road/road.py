@@ -93,12 +93,9 @@ class BankingTable:
 
 
 class Area(NamedTuple):
-    """A rectangle of the road [m], from start (included) to end and from right to left border (included).
+    """A rectangle of the road, with friction `mu` at the start (included), which changes by `slope_1pm` per metre."""
 
-    Its friction is `mu` at the start and changes by `slope_1pm` per metre. On a road along a path, x is the distance
-    along the path and y the distance to its left.
-    """
-
+    # On a road along a path, x is the distance along the path and y the distance to its left.
     start_m: float
     end_m: float
     right_m: float

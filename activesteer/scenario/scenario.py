@@ -223,10 +223,7 @@ def check_parts(overrides: Mapping[str, Any], scenario: Scenario, parts: Sequenc
 def part_of(
     key: str, kind: type[Maneuver], owned: Mapping[str, Sequence[Plugin]] | None = None
 ) -> tuple[str, list[str]]:
-    """Return the part of the scenario that an override changes, and its key within the part.
-
-    Without `owned`, the users' controllers by their names, a parameter of a user's controller is not checked.
-    """
+    """Return the part of the scenario that an override changes, and its key; `owned` checks users' parameters."""
     first, *rest = key.split(".")
     own = own_path(key)
     if own is not None and (owned is None or own[0] in owned):
@@ -266,10 +263,7 @@ def holders_of(key: str, kind: type[Maneuver]) -> tuple[str, ...]:
 
 
 def value_of(scenario: Scenario, key: str, controllers: Sequence[Any] = ()) -> Any:
-    """Return the value of a key of the manoeuvre, the vehicle or the driver, in the unit of the key.
-
-    `resolve` describes keys and controllers.
-    """
+    """Return the value of a key of the manoeuvre, the vehicle or the driver, in the unit of the key (see `resolve`)."""
     part, path = part_of(key, type(scenario.maneuver))
     if part == "controllers":
         if path[0] not in (owned := own_controllers(controllers)):
@@ -315,11 +309,7 @@ _SAMPLES: Final = 200
 
 
 def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> tuple[str, Scenario]:
-    """Change one key of a scenario during a run.
-
-    Returns:
-        The block that must be made anew, `controller` or `driver`, or an empty string, and the changed scenario.
-    """
+    """Change a key during a run; return the block to make anew, `controller`, `driver` or "", and the scenario."""
     value = plain({key: value})[key]
     owned = own_controllers([controller])
     part, path = part_of(key, type(scenario.maneuver), owned)
@@ -412,11 +402,7 @@ def led(table: dict[str, Any], lag_s: float) -> dict[str, Any]:
 
 
 def open_loop_of(recording: Recording, name: str) -> dict[str, Any]:
-    """Return the manoeuvre that repeats the steering wheel angle, or rack travel, and the speed of a recording.
-
-    The manoeuvre starts at the first row of the recording and has its length.
-    A recorded brake pedal (`brake_pedal`, 0 to 1) is pressed again; meanwhile the speed is not held.
-    """
+    """Return the manoeuvre that repeats steering wheel angle or rack travel, brake pedal and speed of a recording."""
     if len(recording) < 2:
         raise RecordingError(f"{name}: {len(recording)} rows are too few to drive", value=len(recording))
     rows = np.arange(0, len(recording), max(1, math.ceil(len(recording) / _LONGEST)))

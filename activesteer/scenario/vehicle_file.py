@@ -22,11 +22,7 @@ _SAME: Final = {"characteristic_speed_mps": "characteristic_speed_kmh"}
 
 
 def write_values(vehicle_file: Path, table: str, values: Mapping[str, str], command: str, date: str) -> None:
-    """Replace values in a table of a vehicle file.
-
-    Keys keep their place and their comments; missing keys are added at the end of the table, and a missing table at the
-    end of the file. A comment below the header of the table names command and date, such as 2026-11-21.
-    """
+    """Replace or add values in a table of a vehicle file; a comment below its header names command and date."""
     before, source = read_toml(vehicle_file)
     lines = source.text.splitlines()
     start = source.line_of([table])

@@ -146,10 +146,7 @@ _MINUTE_S: Final = 60.0
 
 
 class SensorBlock:
-    """The sensors of one car: `CHAIN` records, and memory for a bit-identical continuation.
-
-    `outputs` is a view of the memory: the members of `Measurement` without its time.
-    """
+    """The sensors of one car: `CHAIN` records, and memory for a bit-identical continuation."""
 
     def __init__(self, sensors: Sensors, timestep_s: float) -> None:
         """Draw the random constants of a run."""

@@ -25,9 +25,8 @@ from activesteer.video.film import CUTAWAY
 
 FRAME_S: Final = 0.016
 """Shortest time between two frames [s]: a screen shows 60 per second."""
-_MAX_S: Final = 0.1
-"""Longest time between two frames [s]. If drawing or simulating takes longer, the drive becomes slower than the clock
-instead of jerky."""
+_MAX_S: Final = 0.1  # a slower drive is better than a jerky one
+"""Longest time between two frames [s]; longer drawing or simulating slows the drive down."""
 _SLOWER: Final = (ord("-"), 333)
 _FASTER: Final = (ord("="), ord("+"), 334)
 """Codes of minus and plus, also on the number pad."""
@@ -38,12 +37,7 @@ _TURN_S: Final = 0.4
 
 
 class FramePacer:
-    """Pacer that synchronises simulated time with a clock.
-
-    Attributes:
-        speed: Simulated seconds per second of the clock.
-        lost_s: Delay of the drive behind the clock so far [s of the clock].
-    """
+    """Pacer that synchronises simulated time with a clock, `speed` simulated seconds per second."""
 
     def __init__(
         self,
@@ -82,13 +76,7 @@ class FramePacer:
 
 
 class Keys:
-    """Keys of the window: space pauses, R restarts, minus and plus halve and double the speed.
-
-    Attributes:
-        paused: Whether the drive is paused.
-        restart: Whether to restart the drive.
-        faster: Factor of the speed, to apply before the next frame.
-    """
+    """Keys of the window: space pauses, R restarts, minus and plus halve and double the speed before the next frame."""
 
     def __init__(self) -> None:
         """Start with a drive that runs."""
@@ -119,11 +107,7 @@ def scene_for(
 
 
 def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FramePacer, keys: Keys) -> tuple[float, bool]:
-    """Drive and show a manoeuvre from start to end, or until the window is closed or the drive is restarted.
-
-    The drawn model is separate from the simulated one: pulling at the car does not affect the simulation. `viewer` is
-    MuJoCo's passive viewer. Return the simulated time [s], and whether the drive reached its end.
-    """
+    """Drive and show a manoeuvre; return the simulated time [s], and whether it was driven to its end."""
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)
     keys.restart = False

@@ -32,9 +32,7 @@ DRIVE, CONTROL, PASS_ON = range(3)
 """Stages of a step, each of which a car can stop before: the driver; the controller; its bus, and the car."""
 DONE, NEEDS_BLOCKS, AT_CHANGE, TAPE_FULL, NEEDS_SETPOINTS = range(5)
 NEEDS_GAINS, NEEDS_DRIVER, NEEDS_CONTROLLER, INSANE = range(5, 9)
-"""Reasons why a car has stopped: its steps are done; it needs its driver and controller in the record; a fault begins
-or ends; the tape is full. It needs the next setpoints, the driver's gains at a new speed, the driver's command, or the
-controller's command; or a value is implausibly large."""
+"""Reasons why a car has stopped, such as a fault that begins or ends, or an implausibly large value (`INSANE`)."""
 
 MESSAGES: Final[dict[str, type[Any]]] = {
     "driver_command": DriverCommand, "actuator_command": ActuatorCommand, "measurement": Measurement, "motion": Motion,

@@ -28,10 +28,7 @@ class RealtimePacer:
         self._late_s = np.empty(4096)
 
     def await_step(self) -> None:
-        """Wait until the time of the next step.
-
-        A step that begins late is not skipped: later steps begin at once until the run has caught up.
-        """
+        """Wait for the next step; a late one is not skipped, later ones begin at once until the run has caught up."""
         now_s = time.perf_counter()
         if self._start_s is None:
             self._start_s = now_s

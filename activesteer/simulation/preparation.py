@@ -145,16 +145,13 @@ def amplitude(scenario: Scenario, search: Search, timestep_s: float) -> float:
 
 
 def _key(scenario: Scenario, search: Search, timestep_s: float) -> str:
-    """Return a digest of everything that affects the amplitude.
-
-    The compiled model includes the content of all model and tyre files, the road and the step. Controllers have no
-    influence, because the car is driven without control.
-    """
+    """Return a digest of everything that affects the amplitude; the model includes its files, road and step."""
     model = scenario.car.on(scenario.maneuver.ground, timestep_s).model
     compiled_model = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, compiled_model)
     parts = {
         "model": hashlib.sha256(compiled_model.tobytes()).hexdigest(),
+        # Controllers have no influence, because the car is driven without control.
         "car": to_table(scenario.car.config) | {"controllers": None},
         "driver": to_table(scenario.driver.parameters) | {"name": "", "title": ""},
         "search": [to_table(search.probe), search.lateral_acceleration_mps2, timestep_s],
@@ -207,10 +204,7 @@ def _steady_acceleration(simulation: ClosedLoop, maneuver: StepSteer, start: Any
 
 
 def _ramp_angle(scenario: Scenario, wanted: float, timestep_s: float) -> float:
-    """Return the steering wheel angle at a lateral acceleration, from a regression line over a slow ramp.
-
-    The model is symmetric, so one side represents both.
-    """
+    """Return the steering wheel angle at a lateral acceleration, by a regression line over a slow ramp to one side."""
     probe, high = scenario.maneuver, FIT[1] * wanted
     simulation = ClosedLoop(scenario, "none", timestep_s)
     recorder = Recorder(simulation.vehicle, simulation.steps)

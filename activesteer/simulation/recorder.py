@@ -14,11 +14,8 @@ from activesteer.native.records import Uncopyable
 from activesteer.recording import McapWriter, Poses
 from activesteer.vehicle import MAX_VALUE, RawRows, Tape, Vehicle
 
-BLOCK_INTERVAL_S: Final = 0.3
-"""Length of a block, which is turned into channels and written at once [s].
-
-A killed process loses less than two blocks (0.6 s): the block being filled, and the block being written.
-"""
+BLOCK_INTERVAL_S: Final = 0.3  # a killed process loses less than two blocks (0.6 s)
+"""Length of a block, which is turned into channels and written at once [s]."""
 MEMORY_BLOCK_INTERVAL_S: Final = 2.0
 """Length of a block without a file [s]: longer, because every block starts with cold caches, which costs 0.2 ms."""
 PACED_BLOCK_INTERVAL_S: Final = 0.02
@@ -60,13 +57,7 @@ class RecordedRows(NamedTuple):
 
 
 class Recorder(Uncopyable):
-    """Rows of one run, in memory and, if a writer is given, in a file that grows with the run.
-
-    Attributes:
-        channels: The table of channels.
-        tape: Tape on which the vehicle records its steps.
-        keeps_all: Whether all rows stay in memory.
-    """
+    """Rows of one run, in memory and, if a writer is given, in a file that grows with the run."""
 
     def __init__(
         self,

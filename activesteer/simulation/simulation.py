@@ -34,8 +34,7 @@ from activesteer.simulation.recorder import PACED_BLOCK_INTERVAL_S, RecordedRows
 from activesteer.simulation.sampled_controller import slow_actuators
 
 MAX_KEPT_VALUES: Final = 2**25
-"""Largest number of values of a run with a file that stay in memory: 256 MiB, about three minutes. The values of a
-longer run are read from the file when needed, so that memory does not grow with the run."""
+"""Largest number of values of a run with a file in memory: 256 MiB, about three minutes. Longer runs read the file."""
 _COARSE_S: Final = 5e-4
 """Step from which longitudinal tyre forces on short obstacles are coarse [s]: they move by 10 % in a millisecond."""
 _COARSE: Final = (

@@ -157,15 +157,9 @@ def _slip_and_motion(turned: RecordingLike, axle: str, to_axle_m: float) -> tupl
 
 
 def _roll_arm(slip: Array, unrolled: Array, roll: Array, rate_radpm: Array, per_step_m: float) -> float:
-    """Return the lateral speed of an axle's wheels per roll rate [m].
-
-    Args:
-        slip: Mean slip angle of the wheels, positive for a positive force [rad].
-        unrolled: The same without relaxation, from steer angle and motion of a body that does not roll [rad].
-        roll: Roll angle [rad].
-        rate_radpm: Roll rate over speed [rad/m].
-        per_step_m: Road between two samples [m].
-    """
+    """Return the lateral speed of an axle's wheels per roll rate [m]; slip angles positive for a positive force."""
+    # `unrolled` has no relaxation: steer angle and motion of a body that does not roll. `rate_radpm` is roll rate over
+    # speed, `per_step_m` the road between two samples.
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
     from scipy.signal import lfilter  # noqa: PLC0415
 

@@ -30,10 +30,7 @@ Try = Callable[[str, Sequence[float]], list[bool]]
 
 
 def highest_clean(attempt: Try) -> float | None:
-    """Return the highest clean speed [km/h], from `COARSE_KMH` and then a finer search.
-
-    It is None if the car is clean at no speed. The search does not go beyond the highest coarse speed.
-    """
+    """Return the highest clean speed [km/h], from `COARSE_KMH` and then a finer search; None if there is none."""
     clean = [speed for speed, good in zip(COARSE_KMH, attempt("coarse", COARSE_KMH), strict=True) if good]
     if not clean or clean[-1] == COARSE_KMH[-1]:
         return clean[-1] if clean else None

@@ -62,23 +62,13 @@ _BEGIN_S: Final = 0.5
 _CHANNELS: Final = ("steering_wheel_rad", "hand_torque_Nm", "yaw_rate_radps", "speed_mps")
 
 
-class Reached(NamedTuple):
-    """Time until a radius is reached and the largest rim force until then, or nan if not reached."""
-
-    time_s: float
-    effort_N: float
-
-
-def reached(run: StandardRun, radius_m: float) -> Reached:
-    """Return the time until a spiral reaches a path radius [m], and the largest rim force."""
-    if not run.channels:
-        return Reached(math.nan, math.nan)
-    tighter = np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]
-    if not tighter.any():
-        return Reached(math.nan, math.nan)
+def reached(run: StandardRun, radius_m: float) -> tuple[float, float]:
+    """Return the time until a path radius is reached [s], and the largest rim force until then [N], or nan."""
+    if not run.channels or not (tighter := np.abs(run["yaw_rate_radps"]) * radius_m >= run["speed_mps"]).any():
+        return math.nan, math.nan
     first = int(np.argmax(tighter))
     effort_N = float(np.abs(run["hand_torque_Nm"][: first + 1]).max()) / RIM_RADIUS_M
-    return Reached(float(run.time_s[first]) - _BEGIN_S, effort_N)
+    return float(run.time_s[first]) - _BEGIN_S, effort_N
 
 
 def examine(runner: StandardRunner) -> Findings:
@@ -88,11 +78,11 @@ def examine(runner: StandardRunner) -> Findings:
     for name, runs in spirals.items():
         requirement = EFFORTS[name]
         for side, run in runs.items():
-            found = reached(run, requirement.radius_m)
-            good = found.time_s <= WITHIN_S and found.effort_N <= requirement.limit_N
+            time_s, effort_N = reached(run, requirement.radius_m)
             efforts.append({
-                "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": found.time_s,
-                "effort_N": found.effort_N, "limit_N": requirement.limit_N, "pass": good,
+                "steering": name, "direction": side, "radius_m": requirement.radius_m, "time_s": time_s,
+                "effort_N": effort_N, "limit_N": requirement.limit_N,
+                "pass": time_s <= WITHIN_S and effort_N <= requirement.limit_N,
             })  # fmt: skip
     try:
         faults = fault_circles(runner)
@@ -436,10 +426,8 @@ def _first_broken_s(runs: _FaultRuns, motion: _Signals) -> float | None:
 
 
 def _tolerant_s(runs: _FaultRuns, fault: Fault, broken_s: float) -> float:
-    """Find the longest duration of a fault within the limits [s], by bisection.
-
-    The search assumes that a longer fault has a larger effect. It returns the bound that meets the limits.
-    """
+    """Find the longest duration of a fault within the limits [s], by bisection."""
+    # The search assumes that a longer fault has a larger effect. It returns the bound that meets the limits.
     good, bad = 0, round(broken_s / runs.timestep_s)
     while bad - good > max(1.0, _RESOLUTION_S / runs.timestep_s):
         middle = (good + bad) // 2

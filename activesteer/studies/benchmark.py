@@ -39,7 +39,7 @@ _RUNS_PER_PROCESS: Final = 4
 _PRODUCTION: Final = {"sensors.preset": "production"}
 
 
-def bench(rounds: int = ROUNDS) -> dict[str, float]:
+def bench(rounds: int) -> dict[str, float]:
     """Measure the time of a step at several stages, and the speed of whole runs."""
     scenario, along_path = with_amplitude_found(resolve("step_steer")), resolve("slalom")
     sedan = with_amplitude_found(resolve("step_steer", "sedan"))
@@ -97,11 +97,9 @@ def per_call_us(function: Callable[..., object], count: int, *arguments: Any) ->
 
 
 def _engine(scenario: Scenario, *, forces: bool) -> float:
-    """Return the time of the engine's step on a standing car [us], with or without our forces.
-
-    Without them, their value at the start is applied as a constant, so that the car stays near its place. A falling
-    car, with its springs at their stops, would be another problem for the engine's solver.
-    """
+    """Return the time of the engine's step on a standing car [us], with or without our forces."""
+    # Without them, their value at the start is applied as a constant, so that the car stays near its place. A falling
+    # car, with its springs at their stops, would be another problem for the engine's solver.
     loop = ClosedLoop(scenario, _CONTROLLER)
     model, data = loop.vehicle.model, loop.vehicle.data
     if forces:
@@ -186,12 +184,8 @@ def _with_file(scenario: Scenario, path: Path) -> float:
     return (time.perf_counter() - start) / simulation.steps * 1e6
 
 
-def bench_tyre(rounds: int = ROUNDS) -> dict[str, float]:
-    """Measure the cost of the tyres: one evaluation of a tyre, and all four tyres in the engine.
-
-    `four_tyres_us` are the microseconds that four tyres with contact, relaxation and the application of their forces
-    add to the engine's passive forces, in the same state.
-    """
+def bench_tyre(rounds: int) -> dict[str, float]:
+    """Measure one evaluation of a tyre, and what four tyres with contact and relaxation add to the engine [us]."""
     scenario = resolve("straight_line")
     vehicle = ClosedLoop(scenario).vehicle
     header = fb.header_of(vehicle.model)
@@ -218,7 +212,7 @@ _REAR_PER_YAW_RATE_S: Final = 0.05
 """Rear wheel angle of this law per yaw rate [s]."""
 
 
-def bench_batch(rounds: int = ROUNDS) -> dict[str, float]:
+def bench_batch(rounds: int) -> dict[str, float]:
     """Measure batches of cars in the sine with dwell, best of several interleaved rounds."""
     found: dict[str, float] = {}
     for size in SIZES:

@@ -103,12 +103,7 @@ def reproduce(
 def drive(
     scenarios: Mapping[str, Scenario], paths: Mapping[str, Mapping[str, Path]], jobs: int | None
 ) -> Iterator[tuple[str, str, str]]:
-    """Drive all runs, and report each run at its end.
-
-    Yield scenario, system, and the reason why the run ended early or an empty string, as each ends.
-
-    A search is made once for all controllers.
-    """
+    """Drive all runs; yield scenario, system, and the reason of an early end or an empty string, as each ends."""
     with workers_for(jobs) as workers:
         queue = TaskQueue(workers)
         for name, scenario in scenarios.items():

@@ -170,12 +170,7 @@ _GRID: Final = 351
 
 
 def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
-    """Draw the forces of a tyre as PNG files.
-
-    The figures are `side_force.png` (side force and aligning moment versus slip angle, for loads and for cambers),
-    `longitudinal_force.png`, `friction_ellipse.png`, `combined_slip.png` and `relaxation_lengths.png`. All of them are
-    at the file's pressure and speed of measurement and within its ranges of validity.
-    """
+    """Draw forces and relaxation lengths as PNG files, at the file's pressure and speed and within its ranges."""
     formula = MagicFormula(params)
     name = params.source.name if params.source else "tyre"
     pictures: dict[str, Callable[[MagicFormula], Picture]] = {

@@ -171,13 +171,11 @@ class Curves:
 
 
 JOINTS: Final = ("x", "y", "z", "toe", "camber", "caster")
-"""Joints of a curve axle's knuckle in the order of the model. The wheel's steer angle and inclination are exactly `toe`
-and `camber`, since the joints turn about z first, then about x, then about y."""
+"""Joints of a curve axle's knuckle. They turn about z, x, y: `toe` and `camber` are exactly steer and inclination."""
 HOLDING_TENDON: Final = "_guide"
 """Suffix of the tendons that hold a wheel of a curve axle: CORNER_NUMBER_guide."""
-_HELD: Final = 0.05
-"""Square of natural frequency times step above which a tendon of the engine holds a mode: 36 Hz at 1 ms. Each tendon
-costs time. Below it the explicit native forces are stable and as accurate."""
+_HELD: Final = 0.05  # 36 Hz at 1 ms; below it the explicit native forces are stable and as accurate
+"""Square of natural frequency times step above which a mode is held by a tendon of the engine, which costs time."""
 _INTERVALS: Final = 32
 
 
@@ -332,13 +330,10 @@ def _strains(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> NDArray[np
 
 
 def _modes(model: mujoco.MjModel, corner: str, axle: AxleCurves) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the modes of a knuckle on its stiffness: squared frequencies and deflections.
-
-    The inertia is that of a fast motion of the five coordinates with the rest free to move. A wheel that turns on its
-    bearing takes no part in the rotation of its knuckle in side view.
-    """
+    """Return squared frequencies and deflections of a knuckle's modes on its stiffness, the rest free to move."""
     from scipy.linalg import eigh  # noqa: PLC0415 - slow to import, and only curve axles need it
 
+    # A wheel that turns on its bearing takes no part in the rotation of its knuckle in side view.
     _, first = _joints_of_model(model, corner)
     dofs = [first + JOINTS.index(name) for name in COORDINATES]
     mirror = _mirror(_side(corner))
@@ -375,10 +370,7 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Return a coordinate's deflection from its curves as for a left wheel, its rate, and the slopes of the curves.
-
-    Then follow deflection and rate as the engine's tendons have them, with straight curves.
-    """
+    """Return deflection, rate and slopes as for a left wheel, then deflection and rate with straight curves."""
     z, vz, s, vs = moved
     f, slope_z = _curve(travel, tc, index, on_travel)
     g, slope_s = 0.0, 0.0

@@ -197,8 +197,7 @@ MOTOR_STATE: Final = numbers_type("torque_Nm", "difference_Nm", "demand_Nm", "po
 """State of a motor: total torque at its wheels, torque of the right wheel minus torque of the left wheel (0 behind an
 open differential), demand before limits, electric power, and whether a limit acts."""
 BATTERY_STATE: Final = numbers_type("power_W", "energy_J", "limited")
-"""Power at the terminals, positive when the battery gives it, energy given since the start, and whether a limit acts.
-"""
+"""Power at the terminals, positive when the battery gives it, energy given since the start, whether a limit acts."""
 FULL_TORQUE_NM: Final = 1e9
 """Demand beyond the strength of any motor [N m]."""
 ENERGY: Final = 1
@@ -227,10 +226,7 @@ def motor_records(motors: Motors, timestep_s: float) -> NDArray[Any]:
 
 
 class ElectricDrive(NamedTuple):
-    """Memory of the electric drive of one car, empty without motors.
-
-    `state` is a `BATTERY_STATE` followed by a `MOTOR_STATE` for each motor, as numbers.
-    """
+    """Memory of a car's electric drive, empty without motors; `state` is a `BATTERY_STATE`, then `MOTOR_STATE`s."""
 
     motors: NDArray[Any]
     battery: NDArray[Any]

@@ -94,19 +94,16 @@ class Faults:
 
 
 class _Acting:
-    """A fault that is active from step `begins` to `ends`, and stores demands from step `listens` on.
-
-    `delay`: steps by which it delays demands or readings. `memory`: the last of them, see `native_faults.FAULT`.
-    """
+    """A fault that is active from step `begins` to `ends`, and stores demands from step `listens` on."""
 
     def __init__(self, fault: Fault, timestep_s: float) -> None:
         self.fault = fault
         self.begins = round(fault.start_s / timestep_s)
         self.ends = _NEVER if fault.end_s is None else max(self.begins + 1, round(fault.end_s / timestep_s))
         self._watches = fault.delay_s is not None
-        self.delay = round((fault.delay_s or 0.0) / timestep_s)
+        self.delay = round((fault.delay_s or 0.0) / timestep_s)  # steps by which demands or readings are late
         self.listens = self.begins - self.delay
-        self.memory = native.memory_of(max(1, self.delay))
+        self.memory = native.memory_of(max(1, self.delay))  # the last of them, see `native_faults.FAULT`
 
     @property
     def _capacity(self) -> int:

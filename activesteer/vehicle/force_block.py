@@ -158,10 +158,7 @@ def sensor_columns(model: mujoco.MjModel, name: str) -> slice:
 
 
 def tendon_arms(model: mujoco.MjModel, name: str) -> dict[str, float]:
-    """Return the coefficients of a fixed tendon by joint, empty without the tendon.
-
-    The units are those of the joints: m/rad for a hinge, 1 for a slide.
-    """
+    """Return a fixed tendon's coefficients by joint, m/rad for a hinge, 1 for a slide; empty without a tendon."""
     tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
     if tendon < 0:
         return {}
@@ -189,8 +186,7 @@ DAMPER: Final = numbers_type(
     "tendon", "row", "length", "points", ("chain", MAX_CHAIN), ("velocity_mps", MAX_CURVE_POINTS),
     ("force_N", MAX_CURVE_POINTS),
 )  # fmt: skip
-"""A damper: a tendon, its place in the sparse tendon Jacobian, and a piecewise linear curve, velocities positive in
-compression, forces positive when they push apart."""
+"""A damper's tendon, place in the tendon Jacobian, and curve; velocity in compression and force apart are positive."""
 
 ACTUATOR: Final = numbers_type(
     "kind", "act", "low", "high", "scale", "offset", "lag_s", "rate_limit", "userdata", "stiffness", "drive_fraction",
@@ -337,9 +333,6 @@ def _view(model: mujoco.MjModel, start: int, kind: np.dtype[Any], count: int) ->
 
 
 def sensor_range(model: mujoco.MjModel) -> tuple[int, int]:
-    """Return the first index in `sensordata` of the callback's sensors, and the number of their values.
-
-    Their values, and then the number of active faults, are the end of `userdata`.
-    """
+    """Return first index and number of the callback's sensor values, which with the faults end `userdata`."""
     ours = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_USER))
     return (int(model.sensor_adr[ours[0]]), int(model.sensor_dim[ours].sum())) if ours.size else (0, 0)

@@ -212,11 +212,7 @@ inertia_warning: Address of the engine's warning for an indefinite matrix: last 
 
 
 class ImplicitPlan:
-    """Plan of one car, with the memory that it points to.
-
-    Attributes:
-        plan: `IMPLICIT_PLAN`, shape (1,), at an address that stays.
-    """
+    """Plan of one car, `IMPLICIT_PLAN` at an address that stays, with the memory that it points to."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Find the order of elimination and look up all addresses."""
@@ -279,10 +275,7 @@ class ImplicitPlan:
         return (*_options(self._model.opt), mujoco.get_mjcb_control())
 
     def follow(self) -> None:
-        """Renew the plan if the data on which it depends have changed.
-
-        This takes two microseconds if nothing has changed. All other changes take effect in each step anyway.
-        """
+        """Renew the plan if its data have changed; this takes two microseconds if nothing has changed."""
         state = watch(*self._watch)
         if state == UNCHANGED and self._current_settings() == self._settings:
             return
@@ -375,11 +368,9 @@ def _mass_columns(model: mujoco.MjModel, dof: int) -> NDArray[Any]:
 
 
 def _tendon_entries(model: mujoco.MjModel, tendon: int) -> NDArray[np.intp]:
-    """Return the elements of `ten_J` of a tendon that may differ from zero.
-
-    The engine keeps the elements of all joints between the tendon's ends and the world. A joint that moves both ends
-    as one body, such as the free joint of the chassis, does not change the length.
-    """
+    """Return the elements of `ten_J` of a tendon that may differ from zero."""
+    # The engine keeps all joints between the tendon's ends and the world. A joint that moves both ends as one body,
+    # such as the free joint of the chassis, does not change the length.
     start = int(model.ten_J_rowadr[tendon])
     entries = np.arange(start, start + model.ten_J_rownnz[tendon])
     first = model.tendon_adr[tendon]

@@ -170,16 +170,12 @@ _MIN_LIKENESS: Final = 0.9
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of the linearised car: a real pole or a conjugate pair.
-
-    It is named after the part that participates most. The eigenvalue has no negative imaginary part; the participation
-    factors have the sum 1, largest first. `shape` and `left` are right and left eigenvector, whose product is 1.
-    """
+    """One mode of the linearised car, a real pole or a conjugate pair, named after the part that participates most."""
 
     name: str
-    eigenvalue_1ps: complex
-    participation: dict[str, float]
-    shape: NDArray[np.complex128]
+    eigenvalue_1ps: complex  # no negative imaginary part
+    participation: dict[str, float]  # factors, largest first, with the sum 1
+    shape: NDArray[np.complex128]  # right eigenvector; its product with the left one is 1
     left: NDArray[np.complex128]
 
     @property

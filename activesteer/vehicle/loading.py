@@ -36,11 +36,7 @@ _TANK_M: Final = (0.4, 0.0, 0.35)
 
 
 def apply_load(spec: mujoco.MjSpec, parameters: VehicleParameters) -> None:
-    """Add the masses of a load to the car.
-
-    Masses are points fixed to the chassis. The site `cg`, whose motion is recorded, moves with the centre of gravity of
-    the whole car. A car without load stays exactly as it is.
-    """
+    """Add the masses of a load as points fixed to the chassis, and move the site `cg`; no change without a load."""
     chassis = spec.body("chassis")
     if chassis is None:
         raise ModelError("there is no body 'chassis'", value="chassis")

@@ -191,10 +191,8 @@ def servo_rate(entry, command, state):
 
 @inlined
 def drive_rate(wheels, header, entry, qvel, command, state, timestep_s):
-    """Return the rate of a wheel's drive torque: first-order lag within the limits of the engine.
-
-    A motor has its dynamics in `step_motors`; its torque is the command.
-    """
+    """Return the rate of a wheel's drive torque: first-order lag within the limits of the engine."""
+    # A motor has its dynamics in `step_motors`; its torque is the command.
     if header.gear == CLUTCH_OPEN or entry.motor != 0.0:
         return (command - state) / timestep_s
     speed = 0.0

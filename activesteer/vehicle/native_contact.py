@@ -52,8 +52,7 @@ CAM_POINTS: Final = 65
 _CAM_STEP_M: Final = 0.006
 """Distance of the tabulated points of a cam [m]: 64 of them reach 0.38 m, beyond any step that a tyre survives."""
 _FINE_M: Final = 0.0004
-"""Distance of the last places at which a cam looks for an obstacle. A step of 25 mm then changes its height by at most
-0.1 mm [m]."""
+"""Distance of the last places of a cam's search for an obstacle [m]: a 25 mm step changes its height by <= 0.1 mm."""
 _GRID_M: Final = 0.002
 """The same for a grid, whose slopes are a tenth of a step's [m]."""
 
@@ -192,10 +191,8 @@ def plane_axes(forward, sideways, heading_x, heading_y):
 
 @compiled
 def spin_on_bend(p, spin, speed, bend, loaded_radius, pressure_Pa):
-    """Return the spin of a tyre on a road that bends along its heading [rad/s].
-
-    The tread rolls off on the road at the effective rolling radius relative to the normal of the plane, which turns
-    with the speed times the bend. The contact point lags behind the centre by the loaded radius times that rate.
-    """
+    """Return the spin of a tyre on a road that bends along its heading [rad/s]."""
+    # The tread rolls on the road relative to the normal of the plane, which turns with the speed times the bend. The
+    # contact point lags behind the centre by the loaded radius times that rate.
     rolling = effective_rolling_radius(p, p.FNOMIN, spin, pressure_Pa)
     return spin - (loaded_radius - rolling) / rolling * bend * speed

@@ -46,8 +46,7 @@ _obstacles_at: Final = records_at(OBSTACLE)
 _cams_at: Final = records_at(CAM)
 _outputs_at: Final = records_at(fb.WHEEL_OUTPUT)
 _LEAST_STRETCH: Final = 0.1
-"""Inverse of the largest ratio of a distance along the middle of a road to the distance beside it. It applies near the
-centre of a curve."""
+"""Inverse of the largest ratio of a distance along a road's middle to the one beside it, near a curve's centre."""
 
 
 @inlined
@@ -274,10 +273,8 @@ def _drag(header, xpos, xmat, com, cvel, cdof, qfrc):
 
 
 def _make_callbacks(layout: EngineLayout) -> tuple[Any, Any, Any]:  # noqa: PLR0915 - three functions in one
-    """Compile the three callbacks, or load them from numba's cache.
-
-    The offsets are closure variables on purpose: numba makes those part of the cache key.
-    """
+    """Compile the three callbacks, or load them from numba's cache."""
+    # The offsets are closure variables on purpose: numba makes those part of the cache key.
     (
         m_count, m_timestep, m_numbers, d_qvel, d_act, d_ctrl, d_userdata, d_xpos, d_xmat, d_com, d_cdof, d_ten_j,
         d_ten_velocity, d_cvel, d_qfrc, d_ten_length, d_sensordata, d_qpos, _,
@@ -419,12 +416,7 @@ def remove_native_forces() -> None:
 
 @contextlib.contextmanager
 def engine_warnings_held() -> Iterator[None]:
-    """Leave the engine's warnings to `Vehicle.check`.
-
-    By default it writes them to a file in the user's folder.
-
-    A handler that another part of the program has installed stays in force.
-    """
+    """Leave the engine's warnings, which it writes to the user's folder, to `Vehicle.check` or an installed handler."""
     if mujoco.get_mju_user_warning() is not None:
         yield
         return

@@ -71,10 +71,8 @@ def _stiffness(a, b, c, x):
 
 @inlined_by_llvm
 def _assemble(plan):
-    """Write the matrix M + h D + h^2 K and the right-hand side f - h K v, in the order of elimination.
-
-    Negative damping and stiffness count as 0 in D and K, as in the engine; the forces contain them anyway.
-    """
+    """Write the matrix M + h D + h^2 K and the right-hand side f - h K v, in the order of elimination."""
+    # Negative damping and stiffness count as 0 in D and K, as in the engine; the forces contain them anyway.
     h = plan.timestep_s
     entries, elements, mass = f64_pointer(plan.factor), f64_pointer(plan.M), _indices(plan.mass)
     for index in range(plan.n_factor):

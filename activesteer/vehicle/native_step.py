@@ -215,12 +215,9 @@ def _set_inputs(bindings, commands_address, torques_set):
 
 @inlined_by_llvm
 def carry_out(bindings_address, commands_address, torques_set, measurement_address, motion_address):
-    """Carry out the commands, advance the engine by one step, record it and read the sensors.
-
-    The numbers of the commands (`COMMAND_ROW`) are copied into the first recorded array after the engine's; those of
-    measurement and motion are written. The step is recorded on the tape of the bindings, unless the state is invalid.
-    Returns whether it is valid.
-    """
+    """Carry out the commands, advance the engine, record and read the sensors; return whether the state is valid."""
+    # The numbers of the commands (`COMMAND_ROW`) are copied into the first recorded array after the engine's. An
+    # invalid state is not recorded.
     bindings = carray(_bindings_pointer(bindings_address), (1,))[0]
     row_address = bindings.sources[_ENGINE_ARRAYS]
     _copy(commands_address, row_address, bindings.sizes[_ENGINE_ARRAYS])

@@ -25,11 +25,8 @@ _TOLERANCE_N: Final = 1e-7
 
 
 def static_ride(model: mujoco.MjModel, data: mujoco.MjData, held: NDArray[np.intp]) -> None:
-    """Move the car into static equilibrium, by Newton's method on the forces at rest.
-
-    The car must stand near the equilibrium. Velocities and activations are set to zero: the tyres carry their load, and
-    no lateral force except from their own asymmetry.
-    """
+    """Move the car, which stands near it, into static equilibrium by Newton's method on the forces at rest."""
+    # The tyres carry their load, and no lateral force except from their own asymmetry.
     free = np.setdiff1d(np.arange(model.nv), held)
     data.qvel[:] = 0.0
     if model.na:

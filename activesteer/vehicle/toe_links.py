@@ -43,10 +43,7 @@ _FIT: Final = 2e-3
 
 
 class ToeLinkMap(NamedTuple):
-    """Polynomials between the change of length of a toe link and its steer angle, in both directions.
-
-    `travel_m` is the largest change of length within the limit, to either side.
-    """
+    """Polynomials from length change of a toe link to steer angle and back; `travel_m` is the limit to either side."""
 
     travel_of_angle: NDArray[np.float64]
     angle_of_travel: NDArray[np.float64]

@@ -11,6 +11,7 @@ import os
 import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
@@ -315,14 +316,13 @@ def _order(rods: list[_Rod], points: dict[str, Array]) -> Iterator[Finding]:
 
 def _crossings(rods: list[_Rod]) -> Iterator[Finding]:
     crossing = []
-    for number, one in enumerate(rods):
-        for two in rods[number + 1 :]:
-            ends = [(a, b) for a in (one.start_m, one.end_m) for b in (two.start_m, two.end_m)]
-            if one.name[:2] != two.name[:2] or any(np.linalg.norm(a - b) < 1e-4 for a, b in ends):
-                continue
-            gap = _distance(one, two)
-            if gap < _TOUCH_M:
-                crossing.append(f"{one.name} and {two.name} ({1e3 * gap:.1f} mm)")
+    for one, two in combinations(rods, 2):
+        ends = product((one.start_m, one.end_m), (two.start_m, two.end_m))
+        if one.name[:2] != two.name[:2] or any(np.linalg.norm(a - b) < 1e-4 for a, b in ends):
+            continue
+        gap = _distance(one, two)
+        if gap < _TOUCH_M:
+            crossing.append(f"{one.name} and {two.name} ({1e3 * gap:.1f} mm)")
     level: Level = "warning" if crossing else "ok"
     words = "yes: " + ", ".join(crossing) if crossing else "no"
     advice = "two rods cannot pass through each other; are two points swapped?" if crossing else ""

@@ -24,11 +24,9 @@ def wheel_travel_m(vehicle: Vehicle) -> Array:
 
 
 def corner_motion(model: mujoco.MjModel, corner: str) -> tuple[dict[str, float], float]:
-    """Return the shortening of each tendon per wheel travel, for rigid links, and how firmly the links hold the wheel.
-
-    The firmness is the smallest singular value of the directions of the links: 0 if two links constrain the same
-    direction, 0.05 to 0.5 in cars. Chassis and rack are held, and springs are left out.
-    """
+    """Return the shortening of each tendon per wheel travel, and how firmly rigid links hold the wheel."""
+    # The firmness is the smallest singular value of the directions of the links: 0 if two links constrain the same
+    # direction, 0.05 to 0.5 in cars. Chassis and rack are held, and springs are left out.
     data = mujoco.MjData(model)
     mujoco.mj_fwdPosition(model, data)
     dofs, lengths = [], []

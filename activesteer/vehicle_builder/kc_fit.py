@@ -30,8 +30,7 @@ _FLOOR: Final = np.diag([4e-9, 4e-9, 1e-7, 1e-7, 1e-7])
 _WHEEL: Final = np.diag([35.0, 35.0, 0.9, 0.26, 0.4])
 """Inertia of a wheel with hub and knuckle [kg, kg m2]."""
 _FASTEST: Final = (2.0 * np.pi * 320.0) ** 2
-"""Square of the highest natural frequency of a wheel [1/s2]. Higher frequencies have no visible effect at a step of 1
-ms, and cost iterations."""
+"""Square of a wheel's highest natural frequency [1/s2]; higher ones cost iterations without visible effect."""
 _UNITS: Final = np.sqrt(np.outer(np.diag(_USUAL), np.diag(_USUAL)))
 _LOWER: Final = np.tril_indices(5)
 _LINEAR: Final = 15
@@ -55,11 +54,9 @@ class Load:
 
 
 def fitted(loads: list[Load]) -> tuple[dict[str, tuple[float, ...]], str]:
-    """Fit stiffness and hardening to the measured compliance, and return them with a remark.
-
-    Directions that are rigid in the tests, as most are in an axle with few soft bushings, keep a small compliance: a
-    wheel oscillates on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
-    """
+    """Fit stiffness and hardening to the measured compliance, and return them with a remark."""
+    # Directions that are rigid in the tests, as most are in an axle with few soft bushings, keep a small compliance: a
+    # wheel oscillates on them at 320 Hz, which is 0.007 mm/kN across the car, or 0.005 deg of wind-up per 100 N m.
     forces = np.concatenate([np.outer(load.x, load.direction) for load in loads] or [np.zeros((0, 5))])
     wanted = np.concatenate([_wanted(load) for load in loads] or [np.zeros((0, 5))])
     weight = np.concatenate([np.full((len(load.x), 1), len(load.x) ** -0.5) for load in loads] or [np.zeros((0, 1))])

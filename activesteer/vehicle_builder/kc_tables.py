@@ -66,10 +66,7 @@ class Samples:
 
 
 def smoothed(x: Array, y: Array, at: Array) -> Array:
-    """Fit a least-squares cubic spline to samples, including both branches of a loop.
-
-    Knots are evenly spaced, at most one for two different positions, so that noise and hysteresis are averaged.
-    """
+    """Fit a least-squares cubic spline to samples of both branches, with evenly spaced knots that average noise."""
     places = len(np.unique(np.round(x / np.ptp(x), 3)))
     intervals = int(np.clip(places // 2, 1, _MOST_INTERVALS))
     low, high = float(x.min()), float(x.max())

@@ -29,8 +29,7 @@ from activesteer.vehicle_builder.design import Axle, CarDesign, hardware_tables,
 from activesteer.vehicle_builder.trim import Trimmed, TrimmedAxle
 
 _LEFT_OF_STIFFNESS: Final = {"front": 0.6, "rear": 1.05}
-"""Ratio of the effective cornering stiffness of an axle to the stiffness of its tyres, in the compact: compliance and
-roll steer."""
+"""Effective cornering stiffness of an axle over its tyres' in the compact: compliance and roll steer."""
 _TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
 
 

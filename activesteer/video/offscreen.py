@@ -30,11 +30,9 @@ _TRY_TIMEOUT_S: Final = 60.0
 
 @functools.cache
 def backend() -> str:
-    """Return the backend of MUJOCO_GL, or the first backend that works.
-
-    Each backend is tried in a separate process: a broken driver may end the process, and PyOpenGL cannot change its
-    backend once it has loaded one.
-    """
+    """Return the backend of MUJOCO_GL, or the first backend that works."""
+    # Each backend is tried in a separate process: a broken driver may end the process, and PyOpenGL cannot change its
+    # backend once it has loaded one.
     wanted = os.environ.get("MUJOCO_GL", "").lower()
     # `glfw` draws to hidden windows of a display; a user who names it has a display.
     names = [wanted] if wanted in (*BACKENDS, "glfw") else list(BACKENDS)

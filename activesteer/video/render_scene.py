@@ -29,8 +29,7 @@ _GHOST_OPACITY: Final = 0.35
 _SHADOW: Final = "shadow"
 _SHADOW_OPACITY: Final = 0.62
 _SHADOW_SIZE: Final = 1.15
-"""Size of the shadow relative to the car. Its outer part fades: a shadow cast by the light would triple the rendering
-time and have a hard edge."""
+"""Size of the shadow relative to the car; a shadow cast by the light would triple the rendering time."""
 _SHADOW_FADES: Final = 0.3
 """Share of the shadow's width and length in which it fades, on either side."""
 

@@ -303,11 +303,9 @@ def _plain(values: Any) -> list[int | float]:
 
 
 def _renamed_engine(path: Path, token: str) -> tuple[str, bytes]:
-    """Return the engine's library under a unique name.
-
-    MuJoCo has its callbacks once per loaded library. Under its own name, the engine of an exported car is a separate
-    library from the engine of another exported car, or of a program that uses MuJoCo itself.
-    """
+    """Return the engine's library under a unique name."""
+    # MuJoCo has its callbacks once per loaded library. Under its own name, the engine of an exported car is a separate
+    # library from the engine of another exported car, or of a program that uses MuJoCo itself.
     before = path.name
     after = f"lib{token}"[: len(before) - 3] + ".so"
     return after, path.read_bytes().replace(before.encode() + b"\0", after.encode() + b"\0")

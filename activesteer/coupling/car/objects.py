@@ -74,8 +74,7 @@ _LEAST_ADDRESS: Final = 1 << 32
 _STRUCT_BYTES: Final = {"model": 8192, "data": 262_144}
 
 SEGMENT, FUNCTION, MODEL, MODEL_ARRAY, DATA, DATA_ARRAY = range(6)
-"""Kinds of targets: the memory of the car, a function of the engine, the structs of the engine, and arrays to which a
-word of such a struct points."""
+"""Kinds of targets: memory of the car, a function, struct or array of the engine."""
 
 
 class Relocation(NamedTuple):

@@ -63,11 +63,8 @@ class Signals(NamedTuple):
 
 
 def signals_of(messages: Sequence[type[Any]]) -> Signals:
-    """Return the signals that messages contain.
-
-    A field of the four wheels is one signal of four numbers, and four signals of one number. If several messages have
-    a field, its name means the first of them; `message.field` means any of them.
-    """
+    """Return the signals of messages: a field of the wheels is one signal of four numbers, and four of one."""
+    # If several messages have a field, its name means the first of them; `message.field` means any of them.
     places: dict[str, tuple[Place, ...]] = {}
     others = set()
     for index, message in enumerate(messages):
@@ -156,11 +153,9 @@ _ANY: Final = (-_LARGEST, _LARGEST)
 
 
 class FmuBlock:
-    """A driver or controller that an FMU computes.
+    """A driver or controller that an FMU computes; its copies share one instance and take turns with it."""
 
-    FMI restores a state only in the instance that saved it. Copies of a block therefore share one instance and take
-    turns with it.
-    """
+    # FMI restores a state only in the instance that saved it.
 
     def __init__(self, fmu: Fmu, setup: Any, parameters: Mapping[str, Any]) -> None:
         """Instantiate and initialise the FMU."""
@@ -347,10 +342,7 @@ _MAX_KEPT_BYTES: Final = 4_000_000
 
 
 class Fmu:
-    """An FMU that can become a driver or controller of any car.
-
-    `PARAMETERS` is as in `activesteer.plugins`.
-    """
+    """An FMU that can become a driver or controller of any car; `PARAMETERS` is as in `activesteer.plugins`."""
 
     checks_itself = True
     reads = ()

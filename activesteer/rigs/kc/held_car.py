@@ -75,15 +75,7 @@ class Case:
 
 
 class HeldCar:
-    """A car on the rig: chassis held, wheels on pads.
-
-    Attributes:
-        model: The engine's model.
-        data: Its state.
-        radius_m: Loaded radii of the standing car [m], shape (4,).
-        origin_m: Position of the chassis' origin in the world [m], shape (3,).
-        load_N: Vertical forces of the pads in the last equilibrium [N], shape (4,).
-    """
+    """A car on the rig: chassis held, wheels on pads."""
 
     def __init__(self, vehicle: Vehicle, springs: Springs = "in") -> None:
         """Put the car on the rig, in its standing attitude."""

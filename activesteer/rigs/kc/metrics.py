@@ -27,8 +27,7 @@ _SMALL: Final = {
     "parallel": SMALL_TRAVEL_M, "opposite": SMALL_TRAVEL_M, "lateral": 1000.0, "longitudinal": 1000.0,
     "aligning": 100.0,
 }  # fmt: skip
-"""Range about static ride in which a straight line gives the slopes, by the first word of a sweep's name: travel [m],
-force [N] or moment [N m]."""
+"""Range about static ride of the slopes' straight line, by the first word of a sweep: travel [m], force [N], [N m]."""
 
 
 class Axle(NamedTuple):

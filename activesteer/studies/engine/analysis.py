@@ -26,8 +26,7 @@ MAX_SAMPLES: Final = 16384
 _MAX_RBD_SAMPLES: Final = 4096
 _RBD_RESAMPLES: Final = 30
 _MIN_SAMPLES: Final = 42
-"""Smallest number of rows for RBD-FAST: it compares 2 * 10 harmonics, also in each half of the samples that its
-confidence interval draws, so a half needs more than 20."""
+"""Smallest number of rows for RBD-FAST: 2 * 10 harmonics need more than 20, also in each half of the samples."""
 
 
 class Index(NamedTuple):
@@ -43,11 +42,8 @@ class Index(NamedTuple):
 def indices(
     kind: str, factors: Sequence[Factor], columns: Mapping[str, Sequence[object]], values: NDArray[np.float64]
 ) -> list[Index]:
-    """Return the sensitivity indices of one metric in one manoeuvre with one vehicle and controller.
-
-    Columns and values are in the order of the design. There are no indices for a grid or a list, for failed runs in a
-    design that needs all of them, or for a metric that does not vary.
-    """
+    """Return the sensitivity indices of one metric in one manoeuvre with one vehicle and controller."""
+    # There are none for a grid or a list, failed runs in a design that needs all, or a metric that does not vary.
     finite = np.isfinite(values)
     discrete = kind in ("grid", "list") or any(factor.kind in ("grid", "choice") for factor in factors)
     if discrete or not finite.any() or np.ptp(values[finite]) == 0.0:
@@ -109,11 +105,9 @@ Point = tuple[Any, ...]
 
 
 def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
-    """Return the factors whose change leaves every metric of every run bit-identical.
-
-    Rows that differ in one factor only are compared. If there are none for a factor, as in a random sample, the first
-    sample is driven again with the ends of the factor's range.
-    """
+    """Return the factors whose change leaves every metric of every run bit-identical."""
+    # Rows that differ in one factor only are compared. If there are none, as in a random sample, the first sample is
+    # driven again with the ends of the factor's range.
     keys = plan.study.keys
     known: dict[Place, dict[Point, str]] = {}
     for row in rows:

@@ -55,11 +55,7 @@ class Samples:
 
 
 def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
-    """Return the combinations of a design.
-
-    Grid factors are crossed with each other and with the sample of the other factors, so that each grid value meets the
-    same sample. `stream` is the number of the independent sample with this seed.
-    """
+    """Return the combinations of a design; each grid value meets the same sample of the other factors."""
     grids = [factor for factor in factors if factor.kind == "grid"]
     sampled = [factor for factor in factors if factor.kind != "grid"]
     if sampled:

@@ -94,8 +94,7 @@ class FactorValues:
 
 _ORDINARY: Final = 0.6
 _UNUSUAL: Final = 0.8
-"""Largest root mean squares of the distances. Settings drawn from uniform ranges around their nominal values have
-1/sqrt(3) = 0.58."""
+"""Largest rms of the distances; settings from uniform ranges about nominal values have 1/sqrt(3) = 0.58."""
 
 
 class Plausibility(StrEnum):
@@ -107,11 +106,7 @@ class Plausibility(StrEnum):
 
 
 class Prior:
-    """Ranges of the factors, and their nominal values.
-
-    Attributes:
-        nominal: Nominal value of every factor.
-    """
+    """Ranges of the factors, and the nominal value of every factor."""
 
     def __init__(self, study: StudyFile) -> None:
         """Find the nominal values: the values of the files, or no change for relative factors."""
@@ -133,11 +128,7 @@ class Prior:
             self.nominal[factor.key] = factor.values[0] if factor.values and found not in factor.values else found
 
     def distances(self, values: Mapping[str, Any]) -> dict[str, float]:
-        """Return the distance of each number from its nominal value, in units of its range on that side.
-
-        Choices have no distance, nor have numbers that do not act with the other values. A number outside its range has
-        a distance above 1.
-        """
+        """Return the distance of each active number from its nominal value, in units of its range on that side."""
         found = {}
         for factor in self._searched:
             value = values.get(factor.key)

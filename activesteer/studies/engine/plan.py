@@ -24,14 +24,7 @@ _LABELS: Final = ("name", "title")
 
 
 class Plan:
-    """The runs of a study: every sample in each manoeuvre and vehicle, and every controller in each sample.
-
-    Attributes:
-        study: The study.
-        settings: Settings that all runs share.
-        samples: Combinations of factors: one set for all controllers, or one for each.
-        digest: Hash of everything that decides the result of the study.
-    """
+    """The runs of a study: every sample in each manoeuvre and vehicle, and every controller in each sample."""
 
     def __init__(self, study: StudyFile, folder: Path | None = None) -> None:
         """Check the study and enumerate its runs."""

@@ -243,10 +243,7 @@ def _histogram(parts: Sequence[Array]) -> dict[str, Any]:
 def _paired(
     pairs: Sequence[tuple[Places, Places]], parts: Sequence[Array], shares: tuple[float, float, float]
 ) -> list[Any]:
-    """Return quantiles of the differences from the first controller in the same sample.
-
-    `smaller` is the share of the samples in which its value is smaller in magnitude.
-    """
+    """Return quantiles of the differences from the first controller in each sample, and the share of smaller values."""
     found: list[Any] = []
     for (first, second), part in zip(pairs, parts[1:], strict=False):
         a, b = parts[0][first], part[second]

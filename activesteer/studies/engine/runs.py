@@ -217,10 +217,7 @@ def run_command(
     overrides: Mapping[str, Any],
     driver: Any = DEFAULT_DRIVER,
 ) -> str:
-    """Return the `activesteer run` command that repeats a run bit-identically.
-
-    A manoeuvre or vehicle given as a table appears as its name. The override `driver` replaces the driver.
-    """
+    """Return the `activesteer run` command that repeats a run bit-identically, with the names of tables."""
     changes = dict(overrides)
     driver = changes.pop("driver", driver)
     words = ["activesteer", "run", _name(maneuver), "-c", controller]

@@ -124,14 +124,7 @@ class Judgement(NamedTuple):
 
 
 class Judge:
-    """Judge of the sets of a search.
-
-    Attributes:
-        objectives: Name -> objective.
-        statements: Name -> statement; `controller` is the name of the requirement to violate.
-        constraints: Name -> constraint.
-        prior: Nominal values of the factors, if statements are the goal.
-    """
+    """Judge of the sets of a search, with objectives, statements and constraints by name."""
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
         """Parse the expressions of a table, with `controller` as the examined controller."""

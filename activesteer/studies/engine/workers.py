@@ -28,13 +28,7 @@ _MOST_JOBS: Final = 16
 
 
 class Workers:
-    """Worker in this process, which executes every task immediately.
-
-    Others override its methods.
-
-    Attributes:
-        in_flight: Number of tasks to submit at a time, so that no worker waits.
-    """
+    """Worker in this process, which executes every task immediately; `in_flight` tasks can be submitted at a time."""
 
     in_flight = 1
 
@@ -108,11 +102,9 @@ class LocalProcesses(Workers):
 
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Context whose new processes solve linear equations in one thread, unless the environment sets a number.
-
-    There is already a process for each processor, and the equations of a run are small: threads of BLAS would wait
-    longer than they calculate, which makes a run a tenth slower.
-    """
+    """Context whose new processes solve linear equations in one thread, unless the environment sets a number."""
+    # There is already a process for each processor, and the equations of a run are small: threads of BLAS would wait
+    # longer than they calculate, which makes a run a tenth slower.
     missing = [name for name in _BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(missing, "1"))
     try:
@@ -143,10 +135,7 @@ _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
 
 
 class DaskCluster(Workers):
-    """A Dask cluster, accessed through its client.
-
-    Its workers may join and leave. One thread of a worker does one task at a time, so start a worker with one thread.
-    """
+    """A Dask cluster, accessed through its client; start its workers, which may come and go, with one thread each."""
 
     def __init__(self, client: Any) -> None:
         """Check the cluster. Its client still belongs to the caller."""
@@ -249,12 +238,7 @@ def _line(reason: BaseException) -> str:
 
 @contextlib.contextmanager
 def workers_for(jobs: int | None = None, *, client: Any = None, scheduler: str | None = None) -> Iterator[Workers]:
-    """Yield the processes of this machine, or a Dask cluster.
-
-    Abandon tasks if the body fails.
-
-    With one job, this process does the work. The scheduler is given by its address or its file.
-    """
+    """Yield this process, processes of this machine, or a Dask cluster; abandon tasks if the body fails."""
     most = max(_MOST_JOBS, 4 * _processors())
     if jobs is not None and not 1 <= jobs <= most:
         raise ParameterError(f"must be 1 to {most}", key=f"--jobs {jobs}", value=jobs, allowed=Range(1, most))
@@ -331,10 +315,7 @@ class TaskQueue:
         self._suspects.append(_Task(key, function, arguments, _ATTEMPTS - 1))
 
     def outcomes(self, more: Iterator[tuple[Any, ...]] | None = None) -> Iterator[Outcome]:
-        """Execute the tasks and yield their outcomes, in the order of completion.
-
-        The caller may add tasks while iterating.
-        """
+        """Execute the tasks, also those added meanwhile, and yield their outcomes in the order of completion."""
         more = iter(()) if more is None else more
         while True:
             self._fill(more)
@@ -391,11 +372,7 @@ def in_parallel(
     scheduler: str | None = None,
     workers: Workers | None = None,
 ) -> list[Any]:
-    """Call a function with each set of arguments, and return the results in the same order.
-
-    `report` gets the index of the arguments and the number of finished calls. Given workers still belong to the caller;
-    otherwise see `workers_for`.
-    """
+    """Call a function with each set of arguments, and return the results in the same order."""
     results: dict[int, Any] = {}
     with workers_for(jobs, scheduler=scheduler) if workers is None else contextlib.nullcontext(workers) as crew:
         tasks = ((place, function, *each) for place, each in enumerate(arguments))

@@ -37,9 +37,10 @@ from activesteer.simulation.runner import simulate
 from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_car
 from activesteer.theory.single_track import SingleTrack
 
+# It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear, and moves the steering wheel further than the
+# friction of the rack can hide.
 STEP_M: Final = 0.5
-"""Offset of the path from the car [m]. It needs about 1.6 m/s2 of lateral acceleration, where tyres are linear. It
-moves the steering wheel further than the friction of the rack can hide."""
+"""Offset of the path from the car [m]."""
 _CLOSE_M: Final = 0.1 * STEP_M
 """Distance from the path that may remain at the end [m]; the friction of the rack hides some."""
 DURATION_S: Final = 7.0
@@ -70,12 +71,9 @@ def small_step(
 
 
 def damping_of(time_s: Array, y_m: Array) -> tuple[float, float]:
-    """Return damping ratio and natural frequency of the oscillation about the path, after its first crossing.
-
-    They belong to the decaying oscillation that fits best by least squares. This equals the logarithmic decrement if
-    all decrements are alike; the friction of the rack makes those of small amplitudes smaller. The damping ratio is 1
-    if the car does not cross the path, even if it stops short of the path.
-    """
+    """Return damping ratio and natural frequency of the best fitting decay about the path, after its first crossing."""
+    # The fit equals the logarithmic decrement if all decrements are alike; the friction of the rack makes those of
+    # small amplitudes smaller. The damping ratio is 1 if the car does not cross the path, even if it stops short of it.
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     off = np.asarray(y_m, dtype=np.float64) / STEP_M - 1.0
@@ -146,10 +144,7 @@ class DriverLoop:
         return np.asarray(-np.mean(z[:, :steps].conj() * answers, axis=1), dtype=np.complex128)
 
     def crossover(self) -> tuple[float, float]:
-        """Return crossover frequency [rad/s] and phase margin [rad], the smallest margin of several.
-
-        Both are nan if the gain never crosses 1.
-        """
+        """Return crossover frequency [rad/s] and smallest phase margin [rad]; nan if the gain never crosses 1."""
         gain, phase = np.log(np.abs(self.response)), np.unwrap(np.angle(self.response))
         # With integrators and a delay, the phase begins between -pi and -2 pi, as close to -pi as possible.
         phase -= 2.0 * math.pi * round((phase[0] + math.pi) / (2.0 * math.pi))
@@ -163,10 +158,8 @@ class DriverLoop:
         return float(frequency), float(margin)
 
     def damping(self) -> tuple[float, float]:
-        """Return damping ratio [-] and natural frequency [rad/s] of the largest oscillation in a small step.
-
-        If no oscillation is visible, the result is 1 and the natural frequency of the largest part.
-        """
+        """Return damping ratio [-] and natural frequency [rad/s] of the largest oscillation in a small step."""
+        # If no oscillation is visible, the result is 1 and the natural frequency of the largest part.
         from scipy.linalg import eig  # noqa: PLC0415 - slow to import
 
         found: Any = eig(self.closed, left=True)

@@ -65,8 +65,7 @@ from activesteer.studies.linear.linearisation import OUTPUTS, LinearCar, linear_
 SPEEDS_KMH: Final = (60.0, 80.0, 100.0, 120.0, 140.0, 160.0)
 """Default speeds [km/h]."""
 FREQUENCIES_RADPS: Final = np.geomspace(0.05, 300.0, 800)
-"""Frequencies [rad/s]: from a hundredth of the car's natural frequency to beyond the natural frequencies of its
-suspensions."""
+"""Frequencies [rad/s], from a hundredth of the car's natural frequency to beyond those of its suspensions."""
 LOOPS: Final = ("rear", "superposition")
 """Points at which a loop is opened, in the order of the demands."""
 ASKED_DISK: Final = 0.5
@@ -244,10 +243,7 @@ def _margins(
     *,
     keep_curves: bool = False,
 ) -> list[list[LoopMargins]]:
-    """Return the margins of several cars, given by overrides.
-
-    A controller that knows the same about two cars is evaluated once. With `keep_curves` the loop gains are kept too.
-    """
+    """Return the margins of several cars, given by overrides; with `keep_curves`, also the loop gains."""
     plugins = [controller_spec(given) for given in controllers]
     answers: dict[tuple[Any, ...], Callable[[Array], Response]] = {}
     every: list[list[LoopMargins]] = []

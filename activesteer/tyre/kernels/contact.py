@@ -115,11 +115,7 @@ def _low_speed_slip_limit(file_limit, sliding_slip, fraction):
 def _rolling_tyre(  # noqa: PLR0915 - one evaluation, compiled as one function
     p, mu, pressure_Pa, low_speed_mps, low_speed_damping_Nspm, timestep_s, fz, vx, vsy, spin, turn, gamma, u, v, w
 ):
-    """Evaluate a tyre at a load above zero.
-
-    The arguments are those of `tyre_on_road`, with the load [N], the velocities of the contact point along and across
-    the heading [m/s], the spin and the yaw rate of the wheel plane [rad/s], the camber [rad] and the relaxation states.
-    """
+    """Evaluate a tyre at a load above zero, with velocities along and across its heading."""
     vsx = vx - spin * effective_rolling_radius(p, fz, spin, pressure_Pa)
     limit_x = max(p.KPUMAX if vsx < 0.0 else -p.KPUMIN, _SMALLEST_SLIP_LIMIT)
     limit_y = max(math.tan(min(p.ALPMAX if vsy > 0.0 else -p.ALPMIN, 1.5)), _SMALLEST_SLIP_LIMIT)
@@ -225,35 +221,14 @@ def tyre_on_road(
     deflection_y_m,
     deflection_z_rad,
 ):
-    """Return the forces of a tyre on the plane road z = 0 and the rates of its relaxation states.
+    """Return the `WheelForces` of a tyre on the plane road z = 0, with the rates of its relaxation states.
 
-    Args:
-        p: Record of the tyre, including the side that the tyre is mounted on.
-        mu: Friction of the road relative to the friction of the tyre file [-].
-        pressure_Pa: Inflation pressure [Pa].
-        low_speed_mps: Speed below which the standstill terms fade in [m/s].
-        low_speed_damping_Nspm: Viscous coefficient of the contact patch at rest [N s/m].
-        timestep_s: Step of the integrator [s].
-        centre_height_m: Height of the wheel centre above the road [m].
-        axis_x: Unit vector of the spin axis, pointing to the left side of the car, world frame.
-        axis_y: Its y component.
-        axis_z: Its z component.
-        velocity_x_mps: Velocity of the wheel centre, world frame [m/s].
-        velocity_y_mps: Its y component.
-        velocity_z_mps: Its z component.
-        spin_x_radps: Angular velocity of the wheel, its spin included, world frame [rad/s].
-        spin_y_radps: Its y component.
-        spin_z_radps: Its z component.
-        deflection_x_m: Relaxation state along the heading [m].
-        deflection_y_m: Relaxation state across the heading [m].
-        deflection_z_rad: Relaxation state about the normal of the road [rad].
-
-    Returns:
-        A `WheelForces`. `heading_x`, `heading_y` is the unit vector of the wheel's heading in the road plane;
-        `arm_..._m` leads from the wheel centre to the contact point, world frame; `limited` is 1.0 if a limit of
-        validity of the tyre file is exceeded; `friction_utilisation` is the used fraction of the available friction,
-        sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2), with the peak coefficients of the file at this load, camber and
-        pressure on this road. It exceeds 1 by as much as the file's shifts and weights of combined slip allow.
+    All vectors are in the world frame. The axis is the unit vector of the spin axis, pointing to the left side of the
+    car. Height and velocity belong to the wheel centre, and the angular velocity includes the spin. `mu` is relative to
+    the friction of the tyre file. The arm leads from the wheel centre to the contact point. `limited` is 1.0 beyond
+    a limit of validity of the tyre file. `friction_utilisation` is
+    sqrt((F_x / mu_x F_z)^2 + (F_y / mu_y F_z)^2), with the peak coefficients of the file at this load, camber and
+    pressure on this road. It exceeds 1 by as much as the file's shifts and weights of combined slip allow.
     """
     horizontal = math.sqrt(axis_x * axis_x + axis_y * axis_y)
     heading_x = axis_y / horizontal

@@ -57,18 +57,7 @@ class Limit(IntFlag):
 
 @compiled
 def limit_flags(p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float) -> int:
-    """Return the sum of the `Limit` values that apply.
-
-    A load of zero is a lifted wheel and not a violation.
-
-    Args:
-        p: Record of the tyre.
-        fz_N: Load [N].
-        kappa: Longitudinal slip.
-        alpha_rad: Slip angle [rad].
-        gamma_rad: Camber [rad].
-        pressure_Pa: Inflation pressure [Pa].
-    """
+    """Return the sum of the `Limit` values that apply. A load of zero is a lifted wheel and not a violation."""
     flags = 0
     if 0.0 < fz_N < p.FZMIN:
         flags += 1
@@ -130,11 +119,7 @@ def aligning_moment(
     tan_alpha: float, lmu: float, d: float, k_x: float, k_y: float, b_y: float, c_y: float, s_hy: float, s_vy: float,
     fx: float, fy: float, fy_trail: float, z0: float, z2: float, z5: float, z6: float, z7: float, z8: float,
 ):  # fmt: skip
-    """Aligning moment at combined slip (4.E31 to 4.E49, 4.E71 to 4.E78).
-
-    Returns:
-        Aligning moment [Nm], pneumatic trail [m], residual moment [Nm].
-    """
+    """Aligning moment [Nm] (4.E31 to 4.E49, 4.E71 to 4.E78), pneumatic trail [m], residual moment [Nm]."""
     r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
     k_ya = k_y + math.copysign(EPSILON, k_y)
     speed = abs(vx)
@@ -173,21 +158,7 @@ def aligning_moment(
 
 
 class SteadyState(NamedTuple):
-    """Results of one evaluation, in ISO-W axes at the contact point.
-
-    Attributes:
-        fx_N: Longitudinal force [N].
-        fy_N: Lateral force [N].
-        mx_Nm: Overturning moment [Nm].
-        my_Nm: Rolling resistance moment [Nm].
-        mz_Nm: Aligning moment [Nm].
-        friction_x: Peak longitudinal friction mu_x.
-        friction_y: Peak lateral friction mu_y.
-        trail_m: Pneumatic trail [m].
-        residual_moment_Nm: Residual part of the aligning moment [Nm].
-        slip_stiffness_N: K_xkappa [N].
-        cornering_stiffness_Nprad: K_yalpha [N/rad].
-    """
+    """Results of one evaluation, in ISO-W axes at the contact point."""
 
     fx_N: float
     fy_N: float
@@ -303,21 +274,11 @@ def steady_state(
 def magic_formula(
     p, fz_N: float, kappa: float, alpha_rad: float, gamma_rad: float, pressure_Pa: float, vx_mps: float, mu: float
 ):
-    """Return forces and moments of the tyre at the contact point in steady state.
+    """Return F_x, F_y [N], M_x, M_y, M_z [Nm] in steady state, in ISO-W axes at the contact point.
 
-    Args:
-        p: Record of the tyre, a `TYRE_RECORD`.
-        fz_N: Load [N]; zero or less gives no forces.
-        kappa: Longitudinal slip -V_sx/|V_x|, positive drives; -1 is a locked wheel.
-        alpha_rad: Slip angle atan(V_sy/|V_x|) [rad].
-        gamma_rad: Camber [rad], positive about +x.
-        pressure_Pa: Inflation pressure [Pa].
-        vx_mps: Speed of the contact point along the wheel's heading [m/s].
-        mu: Friction of the road relative to the file; multiplies LMUX and LMUY, and narrows the curves of
-            combined slip accordingly.
-
-    Returns:
-        F_x [N], F_y [N], M_x [Nm], M_y [Nm], M_z [Nm] in ISO-W axes.
+    Slip is kappa = -V_sx/|V_x| (-1 is a locked wheel) and alpha = atan(V_sy/|V_x|), with the speed V_x of the contact
+    point along the wheel's heading. A load of zero or less gives no forces. The friction of the road, relative to the
+    file, multiplies LMUX and LMUY, and narrows the curves of combined slip accordingly.
 
     Validity: the ranges of the file; outside them the value at the limit.
     Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.
@@ -328,21 +289,7 @@ def magic_formula(
 
 @compiled
 def slip_stiffnesses(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the slopes of the forces at zero slip.
-
-    The friction of the road does not affect them.
-
-    Args:
-        p: Record of the tyre.
-        fz_N: Load [N].
-        gamma_rad: Camber [rad].
-        pressure_Pa: Inflation pressure [Pa].
-
-    Returns:
-        Slip stiffness K_xkappa [N], > 0, and cornering stiffness K_yalpha [N/rad], < 0 in ISO-W axes.
-
-    Source: Pacejka 2012, 4.E15 and 4.E25.
-    """
+    """Return K_xkappa [N], > 0, and K_yalpha [N/rad], < 0 in ISO-W axes, without the road's friction (4.E15, 4.E25)."""
     if not fz_N > 0.0:
         return 0.0, 0.0
     load = clamp(fz_N, p.FZMIN, p.FZMAX)
@@ -368,15 +315,8 @@ ROLLING_COLUMNS = (
 
 @compiled
 def evaluate_rows(tyre, inputs, forces, flags) -> None:
-    """Evaluate `steady_state` and `limit_flags` for every row.
-
-    Args:
-        tyre: Record of the tyre, shape (1,): a call with an array costs less than one with a record.
-        inputs: Columns of INPUT_COLUMNS, shape (n, 8).
-        forces: Filled with the columns of FORCE_COLUMNS, shape (n, 11).
-        flags: Filled with the limit flags, int64, shape (n,).
-    """
-    p = tyre[0]
+    """Evaluate `steady_state` and `limit_flags` for the rows of INPUT_COLUMNS; fill FORCE_COLUMNS and int64 flags."""
+    p = tyre[0]  # a call with an array of shape (1,) costs less than one with a record
     for i in range(inputs.shape[0]):
         fz, kappa, alpha, gamma = inputs[i, 0], inputs[i, 1], inputs[i, 2], inputs[i, 3]
         pressure = inputs[i, 4]
@@ -388,14 +328,7 @@ def evaluate_rows(tyre, inputs, forces, flags) -> None:
 
 @compiled
 def rolling_rows(tyre, inputs, forces, rolling) -> None:
-    """Compute relaxation lengths, radii and contact patch for every row.
-
-    Args:
-        tyre: Record of the tyre, shape (1,): a call with an array costs less than one with a record.
-        inputs: Columns of INPUT_COLUMNS, shape (n, 8).
-        forces: Columns of FORCE_COLUMNS, shape (n, 11).
-        rolling: Filled with the columns of ROLLING_COLUMNS, shape (n, 8).
-    """
+    """Fill ROLLING_COLUMNS, relaxation lengths, radii and contact patch, from INPUT_COLUMNS and FORCE_COLUMNS."""
     p = tyre[0]
     for i in range(inputs.shape[0]):
         fz, kappa, gamma, pressure = inputs[i, 0], inputs[i, 1], inputs[i, 3], inputs[i, 4]

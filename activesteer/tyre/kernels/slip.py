@@ -70,11 +70,7 @@ def cornering_stiffness(p, fz: float, gamma_s: float, dpi: float) -> float:
 def longitudinal_force(
     p, fz: float, dfz: float, dpi: float, kappa: float, gamma: float, lmu: float, d: float, z1: float
 ):
-    """Longitudinal force at pure slip (4.E9 to 4.E18).
-
-    Returns:
-        Force [N], peak friction, slip stiffness [N].
-    """
+    """Longitudinal force at pure slip [N] (4.E9 to 4.E18), peak friction, slip stiffness [N]."""
     mu = (p.PDX1 + p.PDX2 * dfz) * (1.0 + p.PPX3 * dpi + p.PPX4 * dpi * dpi)
     mu *= (1.0 - p.PDX3 * gamma * gamma) * lmu
     c_x = p.PCX1 * p.LCX
@@ -93,11 +89,7 @@ def lateral_force(
     p, fz: float, dfz: float, dpi: float, alpha_s: float, gamma_s: float, lmu: float, d: float,
     z0: float, z2: float, z3: float, z4: float,
 ):  # fmt: skip
-    """Lateral force at pure side slip (4.E19 to 4.E30).
-
-    Returns:
-        Force [N], peak friction, cornering stiffness K_yalpha [N/rad], B_y, C_y, S_Hy, S_Vy [N].
-    """
+    """Lateral force at pure slip [N] (4.E19 to 4.E30), peak friction, K_yalpha [N/rad], B_y, C_y, S_Hy, S_Vy [N]."""
     k_y = cornering_stiffness(p, fz, gamma_s, dpi) * z3
     shift = (p.PHY1 + p.PHY2 * dfz) * p.LHY * d
     shifted = p.LMUY if p.SCALE_PEAKS_ONLY != 0.0 else lmu
@@ -160,10 +152,7 @@ def friction_ellipse(
     p, fz: float, dfz: float, d: float, kappa: float, alpha_s: float, fx0: float, fy0: float, dx: float, dy: float,
     k_x: float, k_y: float, s_hy: float, s_vy: float, lmux: float,
 ):  # fmt: skip
-    """Return the factors of both pure forces at combined slip, by the friction ellipse of PAC2002.
-
-    Returns:
-        Factors of the longitudinal and of the lateral force, 0 to 1.
+    """Return the factors, 0 to 1, of both pure forces at combined slip, by the friction ellipse of PAC2002.
 
     Source: the friction ellipse of MSC's PAC2002 (without its weights), as in Project Chrono's ChPac02Tire:
     F_x = F_x0 / sqrt(1 + (mu_x t / mu_ymax)^2), F_y = F_y0 / sqrt(1 + (mu_y / (t mu_xmax))^2) with the ratio of the
@@ -255,10 +244,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 
 @compiled
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of a rolling tyre for the contact [m].
-
-    If file or vehicle say that slip builds up at once, they are the lengths of a tread block.
-    """
+    """Return the relaxation lengths of a rolling tyre [m]: of a tread block if slip is to build up at once."""
     if p.RELAXATION_OFF != 0.0:
         return MIN_RELAXATION_LENGTH_M, MIN_RELAXATION_LENGTH_M
     return relaxation_lengths(p, fz_N, gamma_rad, pressure_Pa)
@@ -276,16 +262,8 @@ def carcass_stiffnesses(p, fz_N: float, pressure_Pa: float):
 
 @compiled
 def relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of longitudinal and lateral slip [m], >= 0.
-
-    MF 6.x: slip stiffness over carcass stiffness. MF 5.2: the PTX and PTY coefficients if the file has them.
-
-    Args:
-        p: Record of the tyre.
-        fz_N: Load [N]; zero or less gives zero lengths.
-        gamma_rad: Camber [rad].
-        pressure_Pa: Inflation pressure [Pa].
-    """
+    """Return the longitudinal and lateral relaxation length [m], >= 0; zero or less load gives zero lengths."""
+    # MF 6.x: slip stiffness over carcass stiffness. MF 5.2: the PTX and PTY coefficients if the file has them.
     if not fz_N > 0.0:
         return 0.0, 0.0
     load = min(max(fz_N, p.FZMIN), p.FZMAX)

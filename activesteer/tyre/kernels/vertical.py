@@ -3,6 +3,8 @@
 Source: Besselink, Schmeitz, Pacejka, An improved Magic Formula/Swift tyre model that can handle inflation pressure
 changes, Vehicle System Dynamics 48 (2010) S1, equations 1 to 10 (the same in Pacejka 2012, A3.1 to A3.7); camber and
 side force terms of MF 6.2: MF-Tyre/MF-Swift 6.2 equation manual (2013).
+
+`deflection_m` is the free radius minus the loaded radius of the rotating tyre; zero or less gives no force.
 """
 
 from __future__ import annotations
@@ -32,14 +34,7 @@ def free_radius(p, omega_radps: float) -> float:
 
 @compiled
 def effective_rolling_radius(p, fz_N: float, omega_radps: float, pressure_Pa: float) -> float:
-    """Effective rolling radius [m]: forward speed of a freely rolling wheel over its rotational speed (equation 7).
-
-    Args:
-        p: Record of the tyre.
-        fz_N: Load [N]; a negative one counts as zero.
-        omega_radps: Rotational speed [rad/s].
-        pressure_Pa: Inflation pressure [Pa].
-    """
+    """Effective rolling radius [m], forward over rotational speed of a freely rolling wheel (eq. 7); load < 0 is 0."""
     fz0 = p.FNOMIN
     ratio = max(fz_N, 0.0) / fz0
     stiffness = p.VERTICAL_STIFFNESS * stiffness_pressure_factor(p, pressure_Pa)
@@ -62,15 +57,6 @@ def vertical_force_loaded(
     p, deflection_m: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
     """Elastic vertical force [N], with the softening by horizontal forces and by camber.
-
-    Args:
-        p: Record of the tyre.
-        deflection_m: Free radius minus loaded radius of the rotating tyre [m]; zero or less gives no force.
-        omega_radps: Rotational speed [rad/s].
-        pressure_Pa: Inflation pressure [Pa].
-        fx_N: Longitudinal force [N].
-        fy_N: Lateral force [N], ISO-W sign.
-        gamma_rad: Camber [rad].
 
     Source: Besselink 2010, equations 2 to 5; MF 6.2 manual for FITTYP 62.
     """
@@ -106,27 +92,14 @@ def vertical_force_loaded(
 
 @compiled
 def bottoming_force(p, deflection_m: float, omega_radps: float) -> float:
-    """Additional vertical force [N] once the tyre is pressed onto the rim.
-
-    Args:
-        p: Record of the tyre.
-        deflection_m: Free radius minus loaded radius of the rotating tyre [m].
-        omega_radps: Rotational speed [rad/s].
-    """
+    """Additional vertical force [N] once the tyre is pressed onto the rim."""
     room = free_radius(p, omega_radps) - p.RIM_RADIUS - p.BOTTOM_OFFST
     return p.BOTTOM_STIFF * max(deflection_m - room, 0.0)
 
 
 @compiled
 def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: float) -> float:
-    """Elastic vertical force [N] of a tyre without horizontal forces and camber, with bottoming on the rim.
-
-    Args:
-        p: Record of the tyre.
-        deflection_m: Free radius minus loaded radius of the rotating tyre [m]; zero or less gives no force.
-        omega_radps: Rotational speed [rad/s].
-        pressure_Pa: Inflation pressure [Pa].
-    """
+    """Elastic vertical force [N] of a tyre without horizontal forces and camber, with bottoming on the rim."""
     elastic = vertical_force_loaded(p, deflection_m, omega_radps, pressure_Pa, 0.0, 0.0, 0.0)
     return elastic + bottoming_force(p, deflection_m, omega_radps)
 
@@ -135,10 +108,7 @@ def vertical_force(p, deflection_m: float, omega_radps: float, pressure_Pa: floa
 def deflection_under_load(
     p, fz_N: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
-    """Deflection [m] that carries a load: the inverse of `vertical_force_loaded`, without bottoming.
-
-    Closed for MF 5.2 and 6.1, by a bracketed search for MF 6.2.
-    """
+    """Deflection [m] under a load, inverse of `vertical_force_loaded` without bottoming; by a search for MF 6.2."""
     if fz_N <= 0.0:
         return 0.0
     r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
@@ -162,11 +132,9 @@ def deflection_under_load(
 
 @compiled
 def contact_patch(p, fz_N: float, pressure_Pa: float):
-    """Return length and width of the contact patch [m] (equations 9 and 10).
-
-    Without Q_RA or Q_RB in the file (MF 5.2), the length follows from the vertical stiffness by the estimate of the
-    MF-Tyre 5.2 manual, and the width is the width of the tyre.
-    """
+    """Return length and width of the contact patch [m] (equations 9 and 10)."""
+    # Without Q_RA or Q_RB in the file (MF 5.2), the length follows from the vertical stiffness by the estimate of the
+    # MF-Tyre 5.2 manual, and the width is the width of the tyre.
     fz = max(fz_N, 0.0)
     r0, fz0 = p.UNLOADED_RADIUS, p.FNOMIN
     stiffness = p.VERTICAL_STIFFNESS * stiffness_pressure_factor(p, pressure_Pa)

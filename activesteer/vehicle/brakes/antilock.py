@@ -205,11 +205,9 @@ def _wheel(setup, state, wheel, car_mps2, fed_Pa):
 
 @compiled
 def antilock(setup, state, ax_mps2, steered_Pa, fed_Pa):
-    """Make the decisions of one control interval for all wheels.
-
-    `steered_Pa` is the side-to-side difference that the controller steers against, in addition to the driver's. A
-    controller that demands more than `fed_Pa`, the pressure of the pedal, at a front wheel intervenes there.
-    """
+    """Make the decisions of one control interval for all wheels."""
+    # The controller steers against `steered_Pa` between the sides, in addition to the driver. It intervenes at a front
+    # wheel where it demands more than `fed_Pa`, the pressure of the pedal.
     highest = setup.full_pedal_pressure_Pa
     slow = state.reference_mps < setup.lowest_speed_mps
     for wheel in range(4):

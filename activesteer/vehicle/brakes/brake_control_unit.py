@@ -33,12 +33,8 @@ def ask(setup, state, pedal, asked_Nm):
 
 @compiled
 def flow(setup, state, pedal):
-    """Advance the pressures by one step.
-
-    Up to its pressure the pedal feeds a brake, beyond it the pump does.
-
-    The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
-    """
+    """Advance the pressures by one step: up to its pressure the pedal feeds a brake, beyond it the pump does."""
+    # The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
     fed = pedal_pressure(setup, pedal)
     for wheel in range(4):
         pressure = state.pressure_Pa[wheel]
@@ -52,8 +48,7 @@ def flow(setup, state, pedal):
 _SLACK_mps2: Final = 0.2
 """Additional deceleration of the estimate, so that the fastest wheel corrects it upwards [m/s2]."""
 _CATCH_UP_mps2: Final = 2.0
-"""Largest rate of that correction; a wheel that swings on its suspension is briefly faster than the car [m/s2].
-"""
+"""Largest rate of that correction [m/s2]: a wheel that swings on its suspension is briefly faster than the car."""
 _LEARN_S: Final = 0.5
 """Time constant of the learned offset of the acceleration [s]."""
 _LARGEST_OFFSET_mps2: Final = 3.0
@@ -103,12 +98,10 @@ def follow_car(setup, state, ax_mps2, braked):
 
 @compiled
 def traction(setup, state, torque_Nm, braked):
-    """Make the decisions of traction control: engine limit, motor torques and brake pressures.
-
-    The mean speed of the driven wheels may exceed the speed of the car by a fraction and a constant. A proportional and
-    an integral part reduce the drive torque by the excess; the integral starts from the torque at that time. Of two
-    wheels behind a differential the faster one is braked, so that the differential passes its torque to the other.
-    """
+    """Make the decisions of traction control: engine limit, motor torques and brake pressures."""
+    # The mean speed of the driven wheels may exceed the speed of the car by a fraction and a constant. A proportional
+    # and an integral part reduce the drive torque by the excess. The integral starts from the torque at that time. The
+    # faster of two wheels behind a differential is braked, so that the differential passes its torque to the other.
     turning, other = 0.0, 0.0
     for wheel in range(4):
         turning += setup.drive_fraction[wheel] * state.wheel_mps[wheel]
@@ -135,11 +128,7 @@ def traction(setup, state, torque_Nm, braked):
 
 @compiled
 def step_brakes(setup, state, speeds_radps, ax_mps2, pedal, drive_Nm, asked_Nm, steered_Pa):
-    """Make one step, and return the drive torque after traction control [Nm].
-
-    Speeds and acceleration are measured, `drive_Nm` and `asked_Nm` are the demands of driver and controller, and
-    `steered_Pa` is the side-to-side difference that the controller steers against.
-    """
+    """Make one step with measured speeds and acceleration; return the drive torque after traction control [Nm]."""
     ask(setup, state, pedal, asked_Nm)
     state.steps_left -= 1.0
     if state.steps_left <= 0.0:

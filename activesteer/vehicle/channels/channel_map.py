@@ -46,11 +46,7 @@ MAX_VALUE: Final = float(np.finfo(np.float32).max)
 
 
 class ChannelMap:
-    """All channels of a vehicle, evaluated block by block.
-
-    Attributes:
-        channels: The table of channels, in the order of the columns.
-    """
+    """All channels of a vehicle, evaluated block by block, with their table in the order of the columns."""
 
     def __init__(self, model: mujoco.MjModel, parameters: VehicleParameters) -> None:
         """Look up the parts of the model by name, once."""

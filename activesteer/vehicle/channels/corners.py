@@ -202,10 +202,8 @@ class CarMotion:
     """Motion of the centre of gravity in the axes of ISO 8855, from sensors in world and body axes."""
 
     def __init__(self, columns: Array, gravity_mps2: Array, last_yaw_rad: float) -> None:
-        """Evaluate all motion channels, by name.
-
-        Sines and angles use numpy, which computes eight at a time; recordings keep its last digits.
-        """
+        """Evaluate all motion channels, by name."""
+        # numpy's sines compute eight at a time; recordings keep the last digits of angles.
         sides, angles, turned = (np.empty((len(columns), count), order="F") for count in (5, 3, 6))
         _all_angle_sides(columns, sides)
         np.arctan2(sides[:, :2], sides[:, 2:4], out=angles[:, :2])
@@ -354,11 +352,9 @@ def steering_signals(model: mujoco.MjModel, steering: Steering) -> list[Signal]:
 
 
 def _column_torque(model: mujoco.MjModel, felt: float) -> AxialForce | None:
-    """Return a fraction of the torque in the steering column [N m], or None without a column.
-
-    The force of the hands' actuator is not this torque. The engine evaluates that force from the demand of this step
-    and the angle at its start, but applies the force at the end of the step.
-    """
+    """Return a fraction of the torque in the steering column [N m], or None without a column."""
+    # The force of the hands' actuator is not this torque: the engine evaluates it from the demand of this step and the
+    # angle at its start, but applies it at the end.
     arms = tendon_arms(model, "steering_column")
     if "steering_wheel" not in arms:
         return None

@@ -55,31 +55,22 @@ class Column(NamedTuple):
 
 
 class AxialForce(NamedTuple):
-    """Axial force of a tendon with a stiffness, tension positive.
-
-    The spring force is a polynomial in the elongation, with the coefficients [N/m], [N/m2] and [N/m3]. The tendon is
-    compressed below the length `low_m`, stretched above `high_m`, and slack in between.
-    """
+    """Axial force of a tendon, tension positive, a polynomial in the elongation and slack between two lengths."""
 
     tendon: int
     stiffness_Npm: float
     second_Npm2: float
     third_Npm3: float
     damping_Nspm: float
-    low_m: float
-    high_m: float
+    low_m: float  # compressed below
+    high_m: float  # stretched above
 
 
 class Actuator(NamedTuple):
-    """Limits of an actuator that follows a command with a lag.
+    """Limits of an actuator that follows a command with a lag; torques are infinite without a limit."""
 
-    Torques are infinite if there is no limit.
-
-    `control`: its place among the commands and the forces; `activation`: among the activations.
-    """
-
-    control: int
-    activation: int
+    control: int  # place among the commands and the forces
+    activation: int  # place among the activations
     lag_s: float
     rate_radps: float
     low_rad: float

@@ -197,13 +197,13 @@ def test_course_and_patches_of_other_friction_are_drawn(tmp_path: Path) -> None:
 
 def test_the_map_is_framed_on_cars_and_course_not_on_a_path_that_goes_on_for_ever() -> None:
     runs = runs_of({"ars": circle(metadata={"course": COURSE})})
-    around = extent(runs)
-    assert around.low_x_m == 0.0
-    assert 28.0 < around.high_x_m < 50.0
-    assert around.low_y_m == -1.0  # a cone
+    least_x, most_x, least_y, most_y = extent(runs)
+    assert least_x == 0.0
+    assert 28.0 < most_x < 50.0
+    assert least_y == -1.0  # a cone
     (low_x, high_x), (low_y, high_y) = map_bounds(runs)
-    assert low_x < around.low_x_m < around.high_x_m < high_x
-    assert low_y < -around.high_y_m < -around.low_y_m < high_y
+    assert low_x < least_x < most_x < high_x
+    assert low_y < -most_y < -least_y < high_y
 
 
 def test_the_car_on_the_map_is_where_it_was_with_its_wheels_steered(tmp_path: Path) -> None:

@@ -51,10 +51,10 @@ def two_faults(monkeypatch) -> None:
 
 def test_force_until_the_radius_of_a_known_spiral():
     """1/12 m of 1/9 m is reached after 3 of 4 s, with 75 of 100 N."""
-    found = r79_circle.reached(spiral(9.0, 100.0, -1.0), 12.0)
-    assert found.time_s == pytest.approx(3.0, abs=0.02)
-    assert found.effort_N == pytest.approx(75.0, abs=0.5)
-    assert math.isnan(r79_circle.reached(spiral(13.0, 100.0), 12.0).effort_N)
+    time_s, effort_N = r79_circle.reached(spiral(9.0, 100.0, -1.0), 12.0)
+    assert time_s == pytest.approx(3.0, abs=0.02)
+    assert effort_N == pytest.approx(75.0, abs=0.5)
+    assert math.isnan(r79_circle.reached(spiral(13.0, 100.0), 12.0)[1])
 
 
 @pytest.mark.usefixtures("two_faults")
