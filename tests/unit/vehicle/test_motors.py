@@ -16,6 +16,7 @@ from activesteer.errors import ManeuverError, ParameterError
 from activesteer.resources import find_vehicle
 from activesteer.road.road import Road
 from activesteer.scenario import load_car
+from activesteer.scenario.car import split_axles
 from activesteer.vehicle import Vehicle
 from activesteer.vehicle.electric_actuators import Battery, Motor, Motors
 from activesteer.vehicle.faults import Faults
@@ -254,3 +255,14 @@ def test_power_of_a_map_has_its_maximum_between_its_points() -> None:
     assert Motor((0.0, 100.0), (10.0, 0.0)).power_W == pytest.approx(250.0)
     assert Motor((0.0, 100.0), (10.0, 0.0), max_power_W=90.0).power_W == 90.0
     assert Battery().discharge_power_W is None
+
+
+def test_an_axle_that_splits_its_torque_drives_a_wheel_by_half_of_torque_and_difference() -> None:
+    splitting = Motor(**GOOD, differential="splitting", split_torque_Nm=600.0)
+    [axle] = split_axles(Motors(rear=splitting))
+    assert (axle.place, axle.difference_Nm) == (2, 600.0)
+    assert axle.torque_Nm == pytest.approx(0.5 * (splitting.wheel_torque_Nm + 600.0))
+    [axle] = split_axles(Motors(fl=Motor(**GOOD), fr=Motor(**GOOD)))
+    own = Motor(**GOOD).wheel_torque_Nm
+    assert (axle.place, axle.torque_Nm, axle.difference_Nm) == (0, own, 2.0 * own)
+    assert split_axles(Motors(front=Motor(**GOOD))) == ()
