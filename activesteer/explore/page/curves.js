@@ -2,7 +2,7 @@
 import { element, number, onTheme, paint, runColour, slippery } from "./look.js";
 
 const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const HEIGHT = 170, HEAD = 36, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
+const HEIGHT = 170, LEAST = 130, HEAD = 30, SLIP = "Slip angle of the axles", CAR_PX = 36, LEAST_CAR_PX = 24, GHOST = "59";
 
 function padded(low, high, least) {
   if (low == null) return [0, least];
@@ -69,10 +69,10 @@ export class Curves {
   }
 
   fit() {
-    const columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length, high = this.table?.firstElementChild.offsetHeight ?? 0;
-    const rows = Math.max(1, Math.round(high / (HEIGHT + HEAD)));
+    const columns = getComputedStyle(this.box).gridTemplateColumns?.split(" ").length, high = this.table?.firstElementChild.offsetHeight + 16 || 0; // with its margins
+    const rows = Math.max(1, Math.floor(high / (LEAST + HEAD)));
     if (this.table) this.table.style.gridRow = columns > 1 ? `span ${3 * rows}` : "";
-    this.tall = { count: columns > 1 && high ? rows * (columns - 1) : 0, height: Math.max(HEIGHT, Math.floor(high / rows) - HEAD) };
+    this.tall = { count: columns > 1 && high ? rows * (columns - 1) : 0, height: rows > 1 ? Math.floor(high / rows) - HEAD : Math.max(HEIGHT, high - HEAD) };
     [...this.plots.values()].forEach(({ plot, holder }, i) => plot.setSize({ width: holder.clientWidth, height: this.height(i) }));
   }
 
@@ -292,7 +292,7 @@ export class Track {
     const foot = 15 * inRows([...words, "cars and widths are 1.0 times larger"]).length;
     // A car has its shape. Widths have the scale of the cars, so that their distances from cones and lanes are true.
     const ends = tracks.flatMap((track) => track.tracks).find(({ car }) => car)?.car.ends ?? [0, 4], length = ends[1] - ends[0];
-    const fit = (height - foot - 20) / (high - low), zoomX = Math.min((width - 20) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
+    const fit = (height - foot - 20) / (high - low), zoomX = Math.min((width - 20 - CAR_PX) / (right - left), fit), zoomY = Math.min(fit, Math.max(zoomX, CAR_PX / length));
     const zoom = Math.max(zoomY, LEAST_CAR_PX / length);
     const place = (x, y) => [width / 2 + (x - (left + right) / 2) * zoomX, (height - foot) / 2 - (y - (low + high) / 2) * zoomY];
     const line = (xs, ys) => { pen.beginPath(); xs.forEach((x, i) => { if (x != null && ys[i] != null) pen.lineTo(...place(x, ys[i])); }); pen.stroke(); };

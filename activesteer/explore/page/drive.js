@@ -327,8 +327,8 @@ export class Drive {
     const rows = {
       speed: `${number(header.speed_kmh, 0)} km/h`, sideslip: `${number(header.sideslip_deg, 1)}°`, "grip used": this.running ? `${number(Math.min(100, 100 * header.friction_use), 0)} %` : "–",
       time: header.missed ? "missed" : this.timed ? `${number(lap, 1)}${before ? ` / ${number(before, 1)}` : ""} s` : `${number(header.time_s, 1)} s`, cones: this.struck ? `${this.struck} (+${number(header.penalty_s, 0)} s)` : "0",
-      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": `${number(header.rear_deg ?? 0, 1)}°`,
-      "front steer added": `${number(header.superposition_deg ?? 0, 1)}°`, control: header.controller,
+      "lateral acc.": `${number(header.ay_mps2, 1)} m/s²`, "yaw rate": `${number(header.yaw_rate_degps, 0)} °/s`, "rear steer": this.rear ? `${number(header.rear_deg ?? 0, 1)}°` : "–",
+      "front steer added": this.front ? `${number(header.superposition_deg ?? 0, 1)}°` : "–", control: header.controller,
     };
     if (!$("gauges").children.length) {
       $("gauges").replaceChildren(...Object.keys(rows).map((name) => element("div", { class: ["speed", "time"].includes(name) ? "large" : PLAIN.includes(name) ? "" : "more" }, element("dt", {}, name), element("dd", {}))));
@@ -338,8 +338,7 @@ export class Drive {
     const cones = this.scene.cones.length > 0, gauge = (name) => $("gauges").children[Object.keys(rows).indexOf(name)];
     gauge("time").firstElementChild.textContent = `time${stroke}`;
     gauge("cones").hidden = !cones;
-    gauge("rear steer").hidden = !this.rear || (cones && small.matches); // a phone has no room for both
-    gauge("front steer added").hidden = !this.front;
+    gauge("rear steer").hidden = cones && small.matches; // a phone has no room for both
     for (const button of $("switch").children) button.setAttribute("aria-pressed", String(button.textContent === header.controller));
     const finished = !this.rounds && header.last_lap_s != null;
     $("again").textContent = header.missed ? "Gate missed: restart" : finished ? "Finished: restart" : "Restart";

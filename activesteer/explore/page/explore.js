@@ -2,7 +2,7 @@
 import { Asking, untickBeyond } from "./asking.js";
 import { Curves, Track } from "./curves.js";
 import { Drive } from "./drive.js";
-import { colourCount, dark, element, explained, inWords, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems, undoScroll } from "./look.js";
+import { colourCount, dark, element, inWords, meaning, mostControllers, number, offer, onTheme, option, runColour, setTheme, small, systems, undoScroll } from "./look.js";
 import { Scene } from "./scene.js";
 import { Socket } from "./socket.js";
 
@@ -77,7 +77,7 @@ function writeAddress() {
   const { controllers, ...names } = choice();
   history.replaceState(null, "", `#${new URLSearchParams({ ...names, controllers: controllers.join(","), ...state.values })}`);
   $("reset").disabled = !Object.keys(state.values).length;
-  $("explained").textContent = controllers.filter((name) => state.titles[name]).map((name) => explained(name, state.titles)).join("; ");
+  if ($("driver").disabled) names.driver = "no driver";
   $("chosen").textContent = [...Object.values(names).map(inWords), controllers.join(", ")].join(" · ");
 }
 
@@ -85,9 +85,9 @@ function addBox(name) {
   const box = element("input", { type: "checkbox", value: name });
   box.addEventListener("change", () => describe(box));
   swatches.set(name, element("i", { class: "swatch" }));
-  // A long name has a row of its own, and breaks after its file.
+  // A long name breaks after its file.
   const [file, ...rest] = name.split(/(?<=:)/);
-  $("controllers").append(element("label", { title: state.titles[name] ?? "", class: name.length > 14 ? "long" : "" }, box, element("span", {}, file, ...rest.flatMap((part) => [element("wbr"), part])), swatches.get(name)));
+  $("controllers").append(element("label", { title: state.titles[name] ?? "" }, box, swatches.get(name), element("span", {}, file, ...rest.flatMap((part) => [element("wbr"), part]), element("span", { class: "quiet" }, ` ${meaning(name, state.titles)}`))));
 }
 
 function without(text = "Choose at least one controller.", hint = true) {
@@ -408,6 +408,7 @@ const player = {
   },
 };
 
+new ResizeObserver(() => document.documentElement.style.setProperty("--tuning", `${$("tuning").offsetHeight}px`)).observe($("tuning")); // below it stays the head of the table
 const fit = () => { $("choice").open = !small.matches; showSliders(); };
 small.addEventListener("change", fit);
 fit();

@@ -39,11 +39,14 @@ export const element = (name, attributes = {}, ...children) => {
 
 // A name of the package in words; a file keeps its name.
 export const inWords = (name) => (name.includes(".") ? name : name.replaceAll("_", " "));
-// A controller with the beginning of its title, such as `ars: active rear steering`.
-export function explained(name, titles) {
-  const title = (titles[name] ?? "").split(/[:;]| \(/)[0];
-  return title ? `${name}: ${title.replace(/^[A-Z](?=[a-z ])/, (letter) => letter.toLowerCase())}` : name;
+// The beginning of the title of a controller, such as `active rear steering`, or what its title says beyond its name.
+export function meaning(name, titles) {
+  const [first, ...rest] = (titles[name] ?? "").split(/[:;] | \(/);
+  const title = first.toLowerCase() === inWords(name) ? rest.join(": ") : first;
+  return title.replace(/^[A-Z](?=[a-z ])/, (letter) => letter.toLowerCase());
 }
+// A controller with its meaning, such as `ars: active rear steering`.
+export const explained = (name, titles) => [name, meaning(name, titles)].filter(Boolean).join(": ");
 // A finger on a slider that turns out to scroll has moved nothing.
 export function undoScroll(slider, moved) {
   let before = null;

@@ -227,7 +227,7 @@ class Chart {
     ctx.strokeStyle = paint.failed; ctx.lineWidth = 1.2 * dpr; ctx.setLineDash([5 * dpr, 3 * dpr]);
     for (const [value] of panel.limits) level(py(value));
     // Names and values of low rows, as on paper, are small, so that they do not meet.
-    const low = panel.names.length && py(1) - py(0) < (panel.row_px ? 2 : 1) * LOW_ROW * dpr;
+    const low = panel.names.length && py(1) - py(0) < (panel.row_px ? 2.5 : 1) * LOW_ROW * dpr;
     ctx.fillStyle = paint.ink; ctx.font = FONT.replace("12px", `${(low ? 9 : 12) * dpr}px`);
     ctx.textAlign = "center"; ctx.textBaseline = "top";
     for (const [x, y, text, colour] of panel.notes) {
@@ -246,7 +246,7 @@ class Chart {
     }
     ctx.fillStyle = paint.ink;
     ctx.textAlign = "left"; ctx.textBaseline = "bottom";
-    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - (low ? 5 : 7) * dpr, bbox.width - 8 * dpr));
+    panel.names.forEach((name, i) => ctx.fillText(name, bbox.left + 4 * dpr, py(i) - (!low ? 7 : panel.row_px ? 2 : 5) * dpr, bbox.width - 8 * dpr));
     ctx.restore();
   }
 

@@ -146,8 +146,8 @@ function parallel(metric, rows) {
       const x = own.flatMap((i) => axes.flatMap((axis) => [along(axis, i), null, along(axis, i)]).slice(2).concat(null));
       return curveOf(c, x, own.flatMap(() => [...axes.keys()].flatMap((row) => [row - NAME_ROOM, null, row]).slice(2).concat(null)), { label: "", shade, dashes: [], marker: "", alpha: 0.7 });
     });
-    const areas = names.map((_, row) => ({ x: [-0.05, 1.05], low: [row - NAME_ROOM, row - NAME_ROOM], high: [row, row], label: "", colour: "#888888", alpha: 0.2, edge: "", shade: null }));
-    return panelOf("", "", { title, curves, areas, names, x_levels: ["least", "greatest"], x_range: [-0.05, 1.05], y_range: [-NAME_ROOM, names.length - 0.95], row_px: 80 });
+    const areas = names.map((_, row) => ({ x: [-0.08, 1.08], low: [row - NAME_ROOM, row - NAME_ROOM], high: [row, row], label: "", colour: "#888888", alpha: 0.2, edge: "", shade: null }));
+    return panelOf("", "", { title, curves, areas, names, x_levels: ["least", "greatest"], x_range: [-0.08, 1.08], y_range: [-NAME_ROOM, names.length - 0.95], row_px: 80 });
   });
   show("parallel", panels, [`${axisOf(metric)}:`, ...axes.at(-1).ends]);
 }

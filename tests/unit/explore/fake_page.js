@@ -27,6 +27,7 @@ Object.assign(globalThis, {
   history: { replaceState: (_state, _title, address) => { location.hash = address; } },
   document: { body: new FakeElement("body"), querySelectorAll: () => [], getElementById: $, createElement: (name) => new FakeElement(name) },
 });
+globalThis.ResizeObserver = class { observe() {} };
 export const sent = [];
 export let hear;
 let connection;
@@ -48,7 +49,7 @@ export const element = (name, attributes = {}, ...children) => {
   return made;
 };
 export const offer = (list, name) => { list.value = name; };
-export const inWords = (name) => name, explained = inWords, option = (name) => element("option", { value: name });
+export const inWords = (name) => name, explained = inWords, meaning = () => "", option = (name) => element("option", { value: name });
 export { number } from "./number.mjs";
 
 export const names = ["none", "ars", "afs", "lqr", "esc"];

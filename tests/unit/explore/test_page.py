@@ -134,10 +134,10 @@ def test_gauges_show_at_most_all_grip_and_only_angles_that_the_controller_adds(t
         frame({{ controller: "none", rear_deg: null, superposition_deg: null }}); see();""",
     )
     assert page["result"] == [
-        ["100 %", None, None],
-        ["100 %", "1.3°", None],
-        ["100 %", "0.0°", None],  # straight ahead, still a controller with rear steering
-        ["100 %", None, None],
+        ["100 %", "\N{EN DASH}", "\N{EN DASH}"],
+        ["100 %", "1.3°", "\N{EN DASH}"],
+        ["100 %", "0.0°", "\N{EN DASH}"],  # straight ahead, still a controller with rear steering
+        ["100 %", "\N{EN DASH}", "\N{EN DASH}"],
     ]
 
 
