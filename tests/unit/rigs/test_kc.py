@@ -14,7 +14,7 @@ from activesteer.errors import ParameterError
 from activesteer.plotting import Panel
 from activesteer.resources import models_dir
 from activesteer.rigs.kc import draw, kinematics_compliance
-from activesteer.rigs.kc.figures import _steering, _targets
+from activesteer.rigs.kc.figures import _pictures, _steering, _targets
 from activesteer.rigs.kc.held_car import WheelPose
 from activesteer.rigs.kc.metrics import DEFINITIONS, FORMULAS, load_targets
 from activesteer.rigs.kc.programme import steering_axis
@@ -72,8 +72,9 @@ def test_every_value_of_the_compact_is_a_number() -> None:
 
 def test_table_names_every_metric_and_counts_the_bands() -> None:
     text = on_the_bench().table()
+    lines = {tuple(line.split()[:2]): line.split()[2] for line in text.splitlines() if line.count(" ") > 3}
     for entry in on_the_bench().metrics:
-        assert entry.name in text
+        assert float(lines[entry.name, entry.axle]) == pytest.approx(entry.value, rel=1e-3, abs=5e-4), entry.name
     asked = [entry for entry in on_the_bench().metrics if entry.band]
     assert f"{len(asked) - len(on_the_bench().outside)} of {len(asked)} target bands met" in text
 
@@ -221,6 +222,24 @@ def test_the_figure_of_the_steering_has_the_ackermann_percentage_of_the_metric()
     assert left.y == pytest.approx(-right.y[::-1], abs=0.01)
     assert left.y[-1] == pytest.approx(on_the_bench()["front", "greatest_inner_angle"], rel=0.01)
     assert left.y[0] == pytest.approx(-on_the_bench()["front", "greatest_outer_angle"], rel=0.01)
+
+
+GREATEST = {"kN": (0.5, 20.0), "mm": (0.1, 500.0), "deg": (0.02, 800.0)}
+"""Range of the greatest ordinate of a figure by its unit, for any passenger car."""
+
+
+def test_the_ordinates_of_the_figures_have_the_size_of_their_units() -> None:
+    seen = set()
+    for name, make in _pictures(on_the_bench()).items():
+        for panel in make().panels:
+            unit = panel.y_label.partition("[")[2].partition("]")[0]
+            if not isinstance(panel, Panel) or unit not in GREATEST or name == "targets":
+                continue
+            seen.add(unit)
+            low, high = GREATEST[unit]
+            values = np.concatenate([np.asarray(curve.y, dtype=float) for curve in panel.curves])
+            assert low < np.nanmax(np.abs(values)) < high, (name, panel.y_label)
+    assert seen == set(GREATEST)
 
 
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:

@@ -132,6 +132,9 @@ def test_iso_7401_steps_to_4_mps2_and_the_responses_of_a_car_without_lag_are_its
             assert response["phase_rad"] == pytest.approx([0.0] * len(response["gain"]), abs=1e-3)
             assert min(response["coherence"]) > 0.999
     assert "coherence" not in found.summary
+    coherence = found.tables[-1]
+    assert {row[-1] for row in coherence.rows} == {"nowhere"}
+    assert coherence.outside == frozenset()
 
 
 def test_iso_21994_stops_from_100_kmh_and_scales_the_distance_by_the_square_of_the_speed():
