@@ -177,7 +177,7 @@ class Section(NamedTuple):
     points: Sequence[Text] = ()  # items of a list
     pictures: Sequence[Picture] = ()
     level: int = 2  # of its heading: 2, or 3 for a part of the section before
-    kind: str = ""  # class of the list, or "repeated" for pictures of a table's values, folded on a phone
+    kind: str = ""  # class of the list, or "repeated" for pictures of a table's values, which paper leaves out
     anchor: str = ""  # name for links and the page's script; the section ends with what the script draws
 
 
