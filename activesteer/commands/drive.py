@@ -104,8 +104,7 @@ def _run(options: argparse.Namespace) -> bool:
     from activesteer.controllers import controller_spec
     from activesteer.core.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
-    from activesteer.scenario import check_gains
-    from activesteer.simulation.preparation import with_amplitude_found
+    from activesteer.resources import find_maneuver, find_vehicle
 
     if options.watch:
         _watch(options)
@@ -116,6 +115,12 @@ def _run(options: argparse.Namespace) -> bool:
     if options.isolate is not None:
         options.driver, *names = (isolated(given, options.isolate) for given in (options.driver, *names))
     controllers = [controller_spec(name) for name in names]
+    find_maneuver(options.maneuver)
+    find_vehicle(options.vehicle)
+    # These compile native code at the first start. A wrong name is answered before.
+    from activesteer.scenario import check_gains
+    from activesteer.simulation.preparation import with_amplitude_found
+
     scenario, failures, alone = _scenario(options), _Failures(), len(controllers) == 1
     check_gains(scenario.overrides, controllers)
     # Check all controllers before the first run.

@@ -46,6 +46,20 @@ def test_help_list_and_info_need_neither_engine_nor_compiler(recording):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("run step_steer -c arss", "there is no controller 'arss'"),
+        ("run step_ster", "no manoeuvre is named 'step_ster'"),
+        ("run step_steer --vehicle compakt", "no vehicle is named 'compakt'"),
+    ],
+)
+def test_a_wrong_name_is_answered_before_anything_is_compiled(tmp_path, words, said):
+    done = call(tmp_path, {"mujoco"}, words)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"activesteer: {said}")
+
+
 def test_help_needs_no_numpy(recording):
     """It takes longer to import than everything else of the command line."""
     done = call(recording.parent, {"numpy", "pyarrow", "tomllib"}, "--help", "--version")
