@@ -146,7 +146,8 @@ ROOMS: Final = {
     "scenario": Room(
         "scenario/*.py config/*.py core/units.py core/limits.py core/metric_table.py",
         "unit/test_config.py unit/test_units.py unit/test_metric_table.py unit/scenario",
-        "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording",
+        "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording unit/simulation/test_changes.py "
+        "unit/vehicle/test_motors.py",
     ),
 }
 
