@@ -104,7 +104,6 @@ def _run(options: argparse.Namespace) -> bool:
     from activesteer.controllers import controller_spec
     from activesteer.core.conventions import DEFAULT_TIMESTEP_S
     from activesteer.coupling.fmu import isolated
-    from activesteer.resources import find_maneuver, find_vehicle
 
     if options.watch:
         _watch(options)
@@ -115,8 +114,7 @@ def _run(options: argparse.Namespace) -> bool:
     if options.isolate is not None:
         options.driver, *names = (isolated(given, options.isolate) for given in (options.driver, *names))
     controllers = [controller_spec(name) for name in names]
-    find_maneuver(options.maneuver)
-    find_vehicle(options.vehicle)
+    _check_names(options)
     # These compile native code at the first start. A wrong name is answered before.
     from activesteer.scenario import check_gains
     from activesteer.simulation.preparation import with_amplitude_found
@@ -153,6 +151,15 @@ def _run(options: argparse.Namespace) -> bool:
         if not options.json:
             print(f"figure: {figure}")
     return bool(failures)
+
+
+def _check_names(options: argparse.Namespace) -> None:
+    """Check the names of manoeuvre and car. A file, which may be a recording, is checked when it is read."""
+    from activesteer.resources import find_maneuver, find_vehicle
+
+    for find, name in ((find_maneuver, options.maneuver), (find_vehicle, options.vehicle)):
+        if not Path(name).suffix:
+            find(name)
 
 
 def _scenario(options: argparse.Namespace) -> Scenario:
