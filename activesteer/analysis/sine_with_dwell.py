@@ -176,23 +176,17 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
             value=abs(float(angle[-1])),
         )
     end = start + int(below[0])
-    near_s = _falls_through(time_s, angle, end - 1, THRESHOLD_RAD)
+    near_s = crossing_time(time_s[start:], -angle[start:], -THRESHOLD_RAD)
     centre_s = crossing_time(time_s[end - 1 :], -angle[end - 1 :], 0.0)
     if centre_s - near_s <= LONGEST_CREEP_S:
         return centre_s
-    above = start + np.flatnonzero(angle[start : end + 1] >= 2.0 * THRESHOLD_RAD)
+    above = start + np.flatnonzero(angle[start : end + 1] > 2.0 * THRESHOLD_RAD)
     if above.size == 0:
         raise RecordingError(
             f"the second half of the sine with dwell stays below {math.degrees(2.0 * THRESHOLD_RAD):.3g} deg: "
             "its completion cannot be determined"
         )
-    return near_s + (near_s - _falls_through(time_s, angle, int(above[-1]), 2.0 * THRESHOLD_RAD))
-
-
-def _falls_through(time_s: Array, values: Array, last: int, level: float) -> float:
-    """Return the time when a signal falls through a level, after the last sample that reaches it."""
-    fraction = (values[last] - level) / (values[last] - values[last + 1])
-    return float(time_s[last] + fraction * (time_s[last + 1] - time_s[last]))
+    return near_s + (near_s - crossing_time(time_s[above[-1] :], -angle[above[-1] :], -2.0 * THRESHOLD_RAD))
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:

@@ -46,7 +46,8 @@ def notes(runs: Mapping[str, Mapping[str, float]]) -> list[str]:
 
 
 _NEAR_SHARE: Final = 0.005
-"""Fraction of a value below which a difference has no percentage, and none counts without a known significance."""
+"""Fraction of a value below which a difference is shown without a percentage. Values of a metric without a known
+significance count as equal below it."""
 
 
 class Change(StrEnum):

@@ -86,7 +86,7 @@ def _solve(solve_once: Any, h: Array, f: Array, a: Array, lower: Array, upper: A
 
 
 class SupervisedActuator:
-    """Monitor of an actuator that fails, until the end of the run, once it stops approaching its demand."""
+    """Monitor of an actuator, which counts as failed from the time at which it has stopped approaching its demand."""
 
     def __init__(self, tolerance_rad: float, window_s: float, interval_s: float) -> None:
         """Start with a working actuator."""

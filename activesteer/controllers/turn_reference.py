@@ -132,7 +132,9 @@ class ConfidenceMonitor(NativeBlock):
 
 @shared
 def confidence(block: ConfidenceMonitor, innovation: float, friction_std: float) -> tuple[float, float]:
-    """Return the part of the friction's variance that measurements removed, and the authority of the model, 0 to 1."""
+    """Return the confidence in the friction and in the model, 0 to 1 each."""
+    # The first is the part of the variance of the assumed friction that the measurements have removed. The second is a
+    # factor on the demands of the controller: 1 while the model explains the car.
     block._mean += block._fraction * (innovation - block._mean)
     if block._mean > EXPLAINED or block._authority < 1.0:
         wanted = min(max((UNEXPLAINED - block._mean) / (UNEXPLAINED - EXPLAINED), 0.0), 1.0)

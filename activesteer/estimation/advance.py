@@ -52,11 +52,12 @@ from activesteer.native.compilation import compiled, inlined
 
 _SHORTEST_S: Final = 0.004
 """Shortest time between two steps of the filters, and step of the model on its way to the current time [s]."""
-# Used friction: acceleration over the largest one that the tyres allow on the road of their files; the largest is
-# forgotten with `friction_s`. Only forces that need a higher friction show one: without the upper bound (at least
-# the assumed friction), front wheels that reach snow before the rear ones were explained by more friction.
+# The used friction is the acceleration over the largest one that the tyres allow on the road of their files. Its
+# largest value is forgotten with `friction_s`. Only forces that need a higher friction show one. Without the upper
+# bound, front wheels that reach snow before the rear ones were explained by more friction.
 _USED_FRACTION: Final = 0.85
-"""Friction bounds: used friction times this, largest used friction over this."""
+"""The friction is at least the used friction times this, and at most the largest used friction over this. The upper
+bound is never below the assumed friction."""
 _USED_S: Final = 0.2
 """Time constant of this acceleration: a car rocks when it stops [s]."""
 # Errors are 0.3 to 0.9 on average in ordinary runs, as covariances include errors that last, and 2 to 5 for 0.1 s where
@@ -64,7 +65,8 @@ _USED_S: Final = 0.2
 # inside two deviations, on 112 recordings (comparison, seed 9).
 _EXPLAINED: Final = 1.5
 _UNEXPLAINED: Final = 6.0
-"""Squared errors over covariances, minus the first, add up to at least 0; a sum beyond the second: another road."""
+"""The squared errors over their covariances, minus the first number, are summed up, and the sum is never below 0. If
+it exceeds the second number, the car has reached another road."""
 _SHOWING_MPS2: Final = 2.0  # with 1 m/s2 a curve with a bank of 4 deg was mistaken for snow
 """Lateral acceleration, measured or expected, below which packed snow bears the car as dry asphalt does [m/s2]."""
 _SHOWING_USED: Final = 0.5  # first value tried; without it, a filter that was sure of ice stayed lost for a second

@@ -51,7 +51,9 @@ def judged(
     file: MeasuredFile, nominal_deg: float, assumed_deg: float, ends: Sequence[tuple[str, str, float, float]],
     distributions: Sequence[Array],
 ) -> CircleValidation:  # fmt: skip
-    """Compare measured angles with the prediction, and with `assumed_deg` without overrides and at interval ends."""
+    """Compare the distributions of measured and predicted angles."""
+    # `assumed_deg` is the prediction without the overrides of `circle.prediction`. `ends` has name and source of each
+    # interval, and this prediction at its ends, the smaller angle first.
     from scipy.stats import gaussian_kde, wasserstein_distance  # noqa: PLC0415 - slow to import
 
     measured, samples, lower, upper = distributions

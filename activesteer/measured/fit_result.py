@@ -51,9 +51,13 @@ def autocorrelation_time(values: Array) -> float:
 def intervals(
     series: Sequence[Array], slopes: Sequence[Array], free: NDArray[np.bool_], *, stated: bool
 ) -> tuple[Array, Array, tuple[float, ...], float]:
-    """Return half intervals and correlations, nan at an end of a range, independent samples, and degrees of freedom."""
-    # The uncertainty is relative to the ranges, linearised at the solution. The t distribution has infinite degrees of
-    # freedom for stated noise.
+    """Return the uncertainty of the parameters relative to their ranges, linearised at the solution.
+
+    Returns:
+        Half of each interval, shape (p,), and correlations of the errors, shape (p, p), both nan for a parameter at an
+        end of its range; independent samples of each series; degrees of freedom of the t distribution, infinite for
+        stated noise.
+    """
     # Least squares weights each series by its stated noise. If this noise is not trusted, each series gets the variance
     # of its residual, and its n samples count as n/tau, with tau its autocorrelation time. The result is exact if the
     # derivatives change slowly compared with the noise, and too wide if they change as fast.

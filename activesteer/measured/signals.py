@@ -64,7 +64,9 @@ def is_time(name: str) -> bool:
 
 
 def known_column(name: str, columns: Collection[str], channels: Collection[str]) -> tuple[str, str, float, bool] | None:
-    """Return channel, its unit, -1 for a sign opposite to ISO 8855, and whether the unit is the exporter's, or None."""
+    """Return the channel that the name of a column stands for, or None."""
+    # The other parts are its unit if the file states none, -1 if the exporter's sign is opposite to ISO 8855, and
+    # whether the unit is the exporter's.
     for mark, names in _NAMES["exporters"].items():
         if mark in columns and name in names:
             key = names[name].lstrip("-")

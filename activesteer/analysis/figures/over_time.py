@@ -207,7 +207,8 @@ def finish_time(axes: Sequence[Axes], drawn: Sequence[DrawnRun]) -> None:
 
 
 def transient(drawn: Sequence[DrawnRun]) -> tuple[float, float]:
-    """Return the time range from before the first motion to after the last run without spin has settled, or all [s]."""
+    """Return the time range from before the first motion to after the last run has settled [s]."""
+    # Runs that spin do not count. If no run settles, this is the whole time.
     start, end = 0.0, max(float(curve.recording.time_s[-1]) for curve in drawn)
     begins, ends = [], []
     for curve in [curve for curve in drawn if not curve.lost] or drawn:

@@ -276,9 +276,10 @@ def magic_formula(
 ):
     """Return F_x, F_y [N], M_x, M_y, M_z [Nm] in steady state, in ISO-W axes at the contact point.
 
-    Slip is kappa = -V_sx/|V_x| (-1 is a locked wheel) and alpha = atan(V_sy/|V_x|), with the speed V_x of the contact
-    point along the wheel's heading. A load of zero or less gives no forces. The friction of the road, relative to the
-    file, multiplies LMUX and LMUY, and narrows the curves of combined slip accordingly.
+    Slip is kappa = -V_sx/|V_x| (positive drives, -1 is a locked wheel) and alpha = atan(V_sy/|V_x|), with the speed V_x
+    of the contact point along the wheel's heading. Camber is positive about +x. A load of zero or less gives no forces.
+    The friction of the road, relative to the file, multiplies LMUX and LMUY, and narrows the curves of combined slip
+    accordingly.
 
     Validity: the ranges of the file; outside them the value at the limit.
     Source: Pacejka, Tire and Vehicle Dynamics, 3rd ed. 2012, section 4.3.2.

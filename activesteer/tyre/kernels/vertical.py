@@ -56,7 +56,7 @@ def _softening(p, omega: float, fx: float, fy: float) -> float:
 def vertical_force_loaded(
     p, deflection_m: float, omega_radps: float, pressure_Pa: float, fx_N: float, fy_N: float, gamma_rad: float
 ) -> float:
-    """Elastic vertical force [N], with the softening by horizontal forces and by camber.
+    """Elastic vertical force [N], with the softening by horizontal forces (ISO-W) and by camber.
 
     Source: Besselink 2010, equations 2 to 5; MF 6.2 manual for FITTYP 62.
     """

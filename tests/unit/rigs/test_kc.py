@@ -224,22 +224,40 @@ def test_the_figure_of_the_steering_has_the_ackermann_percentage_of_the_metric()
     assert left.y[0] == pytest.approx(-on_the_bench()["front", "greatest_outer_angle"], rel=0.01)
 
 
-GREATEST = {"kN": (0.5, 20.0), "mm": (0.1, 500.0), "deg": (0.02, 800.0)}
-"""Range of the greatest ordinate of a figure by its unit, for any passenger car."""
+def test_the_figures_have_the_values_of_the_metrics() -> None:
+    result, pictures = on_the_bench(), _pictures(on_the_bench())
 
+    def curves(name: str) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
+        """Return the first curve of each panel by axle and the beginning of its ordinate's label."""
+        panels = [panel for panel in pictures[name]().panels if isinstance(panel, Panel)]
+        labels = [
+            panels[place - place % 2].y_label.replace("\n", " ").partition(" [")[0] for place in range(len(panels))
+        ]
+        return {
+            (("front", "rear")[place % 2], label): (np.asarray(panel.curves[0].x), np.asarray(panel.curves[0].y))
+            for place, (panel, label) in enumerate(zip(panels, labels, strict=True))
+        }
 
-def test_the_ordinates_of_the_figures_have_the_size_of_their_units() -> None:
-    seen = set()
-    for name, make in _pictures(on_the_bench()).items():
-        for panel in make().panels:
-            unit = panel.y_label.partition("[")[2].partition("]")[0]
-            if not isinstance(panel, Panel) or unit not in GREATEST or name == "targets":
-                continue
-            seen.add(unit)
-            low, high = GREATEST[unit]
-            values = np.concatenate([np.asarray(curve.y, dtype=float) for curve in panel.curves])
-            assert low < np.nanmax(np.abs(values)) < high, (name, panel.y_label)
-    assert seen == set(GREATEST)
+    def slope(x: np.ndarray, y: np.ndarray) -> float:
+        near = np.abs(x) < 15.001
+        return float(np.polynomial.Polynomial.fit(x[near], y[near], 1).convert().coef[1])
+
+    travel = curves("parallel_travel")
+    assert len(travel) == 10
+    for axle in ("front", "rear"):
+        for label, name, factor in (
+            ("toe", "static_toe", 1.0), ("camber", "static_camber", 1.0), ("vertical force", "wheel_load", 1e-3),
+        ):  # fmt: skip
+            standing = float(np.interp(0.0, *travel[axle, label]))
+            assert standing == pytest.approx(factor * result[axle, name], rel=0.01), (axle, label)
+        for label, name, factor in (
+            ("contact point outwards", "track_change", 0.5e-3), ("wheel centre forwards", "wheel_recession", -1e-3),
+            ("vertical force", "wheel_rate", 1e-3), ("toe", "bump_steer", 1e-3),
+        ):  # fmt: skip
+            found = slope(*travel[axle, label])
+            assert found == pytest.approx(factor * result[axle, name], rel=0.02, abs=1e-4), (axle, label)
+    pushed, _ = curves("longitudinal_force")["front", "toe"]
+    np.testing.assert_allclose(pushed, 1e-3 * result.curves["longitudinal_patch"].x)  # forwards positive
 
 
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from activesteer.maneuver import Maneuver
-from activesteer.scenario import FileOrTable
 from activesteer.standards.standard import StandardRun
 from tests.unit.standards.runners import PrescribedRunner
 from tests.unit.standards.signals import run_of, times
@@ -28,12 +28,10 @@ TORQUE_NmPMPS2: Final = 0.8
 
 
 class LinearCarRunner(PrescribedRunner):
-    """A runner that computes the channels from the setpoints of each manoeuvre, and keeps the manoeuvres."""
+    """A runner that computes the channels from the setpoints of each manoeuvre."""
 
     def __init__(self, metrics: Mapping[str, float] | None = None) -> None:
-        super().__init__(lambda *_: {})
-        self.metrics = metrics or {}
-        self.maneuvers: dict[str, list[Maneuver]] = {}
+        super().__init__(lambda *_: metrics or {})
         config = self.scenario("straight_line").car.config
         self.ratio, track = config.steering.ratio, config.single_track
         self.rear_m, self.wheelbase_m = track.cg_to_rear_m, track.cg_to_front_m + track.cg_to_rear_m
@@ -42,19 +40,8 @@ class LinearCarRunner(PrescribedRunner):
         """Return the steering wheel angle of a steady turn."""
         return self.ratio * (self.wheelbase_m * ay_mps2 / speed_mps**2 + EG * ay_mps2)
 
-    def drive(
-        self,
-        series: str,
-        maneuver: FileOrTable,
-        cases: Sequence[Mapping[str, Any]],
-        overrides: Mapping[str, Any] | None = None,
-        curves: Sequence[str] = (),
-    ) -> list[StandardRun]:
-        found = [self.scenario(maneuver, {**(overrides or {}), **case}).maneuver for case in cases]
-        self.maneuvers.setdefault(series, []).extend(found)
-        return [
-            StandardRun(case, self.metrics, self.channels(each), "") for case, each in zip(cases, found, strict=True)
-        ]
+    def run_of(self, series: str, case: Mapping[str, Any], maneuver: Maneuver) -> StandardRun:
+        return replace(super().run_of(series, case, maneuver), channels=self.channels(maneuver))
 
     def channels(self, maneuver: Maneuver) -> Mapping[str, np.ndarray]:
         """Return the channels of the car in a manoeuvre."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from activesteer.scenario import FileOrTable, resolve
+from activesteer.maneuver import Maneuver
+from activesteer.scenario import FileOrTable
 from activesteer.standards.standard import StandardRun, StandardRunner
 from activesteer.studies.engine.workers import Workers
 
@@ -20,6 +21,7 @@ class PrescribedRunner(StandardRunner):
         super().__init__("", "compact", "typical", "none", changed or {}, None, Workers(), lambda *_: None)
         self.driven = driven
         self.asked: dict[str, list[dict[str, Any]]] = {}
+        self.maneuvers: dict[str, list[Maneuver]] = {}
 
     def drive(
         self,
@@ -30,12 +32,14 @@ class PrescribedRunner(StandardRunner):
         curves: Sequence[str] = (),
     ) -> list[StandardRun]:
         # Every case must be one that can be driven.
-        resolve(maneuver, self.vehicle, {**(overrides or {}), **self.overrides, **cases[0]})
+        found = [self.scenario(maneuver, {**(overrides or {}), **case}).maneuver for case in cases]
+        self.maneuvers.setdefault(series, []).extend(found)
         self.asked.setdefault(series, []).extend(dict(case) for case in cases)
-        return [_run(case, self.driven(series, case)) for case in cases]
+        return [self.run_of(series, case, each) for case, each in zip(cases, found, strict=True)]
 
-
-def _run(case: Mapping[str, Any], found: Mapping[str, float] | str | StandardRun) -> StandardRun:
-    if isinstance(found, StandardRun):
-        return found
-    return StandardRun(case, {}, {}, found) if isinstance(found, str) else StandardRun(case, found, {}, "")
+    def run_of(self, series: str, case: Mapping[str, Any], maneuver: Maneuver) -> StandardRun:
+        """Return the prescribed run of a case; subclasses may compute its channels from the manoeuvre."""
+        found = self.driven(series, case)
+        if isinstance(found, StandardRun):
+            return found
+        return StandardRun(case, {}, {}, found) if isinstance(found, str) else StandardRun(case, found, {}, "")
