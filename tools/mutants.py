@@ -109,9 +109,6 @@ ROOMS: Final = {
     ),
     "road": Room("road/*.py", "unit/road", "unit/driver physics/test_road.py physics/test_uneven_road.py"),
     "analysis/harm": Room("analysis/harm.py", "unit/analysis/test_harm.py", "physics/test_harm.py"),
-    "measured/comparison": Room(
-        "measured/comparison.py", "unit/measured/test_comparison.py", "cli/test_measured.py unit/measured"
-    ),
     "analysis": Room(
         " ".join(f"analysis/{name}.py" for name in _METRICS.split()),
         " ".join(f"unit/analysis/test_{name}.py" for name in _METRICS.split()),
@@ -127,7 +124,7 @@ ROOMS: Final = {
     "standards": Room("standards/*.py", "unit/standards"),
     "rigs": Room("rigs/kc/*.py", "unit/rigs/test_kc.py", "physics/test_kinematics_compliance.py unit/vehicle_builder"),
     "vehicle": Room(
-        "vehicle/[!n]*.py vehicle/channels/*.py",
+        "vehicle/[!fn]*.py vehicle/force_block.py vehicle/channels/*.py",
         "unit/vehicle physics/test_toe_link_screw.py physics/test_step_steer.py",
         "physics/test_symmetry.py physics/test_balance.py physics/test_signs.py physics/test_electric_power.py "
         "physics/test_superposition_actuator.py physics/test_static_ride.py physics/test_loaded_car.py "
@@ -144,7 +141,7 @@ ROOMS: Final = {
         "recording/*.py", "unit/recording", "unit/simulation/test_recorder.py unit/playback/test_file.py"
     ),
     "scenario": Room(
-        "scenario/*.py config/*.py core/units.py core/limits.py core/metric_table.py",
+        "scenario/*.py config/__init__.py core/units.py core/limits.py core/metric_table.py",
         "unit/test_config.py unit/test_units.py unit/test_metric_table.py unit/scenario",
         "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording unit/simulation/test_changes.py "
         "unit/vehicle/test_motors.py",

@@ -117,16 +117,18 @@ $$$$$$$$
 
 
 def crg(data: np.ndarray, form: str = "LRFI", more: str = "", blocks: str = "") -> CrgRoad:
+    return read_crg("road.crg", lambda _: crg_content(data, form, more, blocks))
+
+
+def crg_content(data: np.ndarray, form: str = "LRFI", more: str = "", blocks: str = "") -> bytes:
     head = HEAD.format(form=form, more=more, blocks=blocks).encode()
     if form == "KRBI":
         text = data.astype(">f4").tobytes()
-        content = head + text + bytes(-len(text) % 80)
-    else:
-        width = 10 if form == "LRFI" else 20
-        cells = ["".join(f"{'*missing*' if np.isnan(x) else f'{x:.7f}'[:width]:>{width}}" for x in row) for row in data]
-        lines = [row[start : start + 80] for row in cells for start in range(0, len(row), 80)]
-        content = head + "\n".join(lines).encode()
-    return read_crg("road.crg", lambda _: content)
+        return head + text + bytes(-len(text) % 80)
+    width = 10 if form == "LRFI" else 20
+    cells = ["".join(f"{'*missing*' if np.isnan(x) else f'{x:.7f}'[:width]:>{width}}" for x in row) for row in data]
+    lines = [row[start : start + 80] for row in cells for start in range(0, len(row), 80)]
+    return head + "\n".join(lines).encode()
 
 
 def rows() -> np.ndarray:
@@ -242,6 +244,25 @@ def test_a_reference_through_the_environment_is_refused() -> None:
     for text in ((), ("!!",), packed({"x": b"no crg"})):
         with pytest.raises(ManeuverError, match=r"empty|damaged|not an OpenCRG"):
             unpacked(text)
+
+
+def test_a_manoeuvre_reads_its_crg_file_and_the_files_that_it_refers_to(tmp_path: Path) -> None:
+    (tmp_path / "data.crg").write_bytes(crg_content(rows()))
+    (tmp_path / "named.crg").write_bytes(b"$ROAD_CRG_FILE\ndata.crg\n$!\n")
+
+    def grid(name: str) -> np.ndarray:
+        road = {"crg": str(tmp_path / name)}
+        table = {"kind": "open_loop", "speed_kmh": 30.0, "duration_s": 1.0, "road": road}
+        return unpacked(resolve(table).maneuver.road.crg_data).grid.z_m
+
+    np.testing.assert_array_equal(grid("data.crg"), crg(rows()).grid.z_m)
+    np.testing.assert_array_equal(grid("named.crg"), crg(rows()).grid.z_m)
+    (tmp_path / "data.crg").unlink()
+    with pytest.raises(ManeuverError, match=r"'data\.crg', which is not found next to it"):
+        grid("named.crg")
+    (tmp_path / "named.crg").write_bytes(b"$ROAD_CRG_FILE\nnamed.crg\n$!\n")
+    with pytest.raises(ManeuverError, match="files in a chain"):
+        grid("named.crg")
 
 
 PLACES = [Path(__file__).resolve().parents[up] / "shared/reference/roads/crg" for up in (4, 5)]
