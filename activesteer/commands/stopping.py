@@ -139,7 +139,7 @@ def _files(output: Path | None) -> list[Path]:
     """Return the file, or the visible files of a folder and of its subfolders."""
     if output is None or not output.is_dir():
         return [output] if output is not None and output.exists() else []
-    return sorted(path for pattern in ("[!.]*", "[!.]*/*") for path in output.glob(pattern) if path.is_file())
+    return sorted(path for pattern in ("[!.]*", "[!.]*/[!.]*") for path in output.glob(pattern) if path.is_file())
 
 
 def _part(path: Path, *, in_order: bool) -> str:

@@ -54,15 +54,16 @@ def test_signal_ends_every_command_at_any_moment(tmp_path, words, number, after_
     stopped(tmp_path, words, number, after_s)
 
 
-def test_a_saved_file_is_named_after_the_clock_was_set_back(tmp_path, monkeypatch):
+def test_a_saved_file_is_named_after_the_clock_was_set_back_and_a_lock_is_not(tmp_path, monkeypatch):
     stop = StopSignals()
     stop.options = argparse.Namespace(output=tmp_path)
     set_back_s = 3600
     monkeypatch.setattr(time, "time_ns", lambda now_ns=time.time_ns: now_ns() - 10**9 * set_back_s)
-    for name, age_s in (("new.json", set_back_s), ("old.json", 3 * set_back_s)):
+    (tmp_path / "part").mkdir()
+    for name, age_s in (("part/new.json", set_back_s), ("part/.lock", set_back_s), ("old.json", 3 * set_back_s)):
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (time.time() - age_s, time.time() - age_s))
-    assert stop._saved(in_order=True) == f"saved: {tmp_path / 'new.json'}"
+    assert stop._saved(in_order=True) == f"saved: {tmp_path / 'part/new.json'}"
 
 
 @pytest.mark.parametrize("swallowed", ["while True: pass", pytest.param("time.sleep(60.0)", marks=pytest.mark.slow)])
