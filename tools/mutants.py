@@ -146,12 +146,12 @@ ROOMS: Final = {
         "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording unit/simulation/test_changes.py "
         "unit/vehicle/test_motors.py",
     ),
-    "coupling": Room("coupling/*.py coupling/*/*.py", "unit/coupling", "cli/test_foreign_controller.py"),
+    "coupling": Room("coupling/*.py coupling/*/*.py", "unit/coupling"),
     "vehicle_builder": Room(
         "vehicle_builder/*.py", "unit/vehicle_builder", "physics/test_own_cars.py cli/test_vehicle.py"
     ),
     "commands": Room("commands/*.py", "cli", "tools docs"),
-    "explore": Room("explore/*.py", "unit/explore cli/test_explore.py", "cli/test_wheel.py"),
+    "explore": Room("explore/*.py", "unit/explore cli/test_explore.py"),
     "playback": Room("playback/*.py", "unit/playback", "render/test_viewer_pictures.py"),
     "video": Room("video/*.py", "unit/video", "render/test_film.py"),
     "drawing": Room("drawing/*.py", "unit/drawing", "unit/playback unit/video unit/analysis/test_report.py"),
