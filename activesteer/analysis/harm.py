@@ -81,7 +81,7 @@ def losses(metrics: Mapping[str, float]) -> Iterator[str]:
     """Describe the failures that the metrics of a run show."""
     peak = next((abs(metrics[name]) for name in SIDESLIP_PEAKS if name in metrics), None)
     if peak is not None and has_spun(metrics):
-        yield f"lost: sideslip angle of {math.degrees(peak):.0f} deg" if math.isfinite(peak) else "lost"
+        yield f"lost with a sideslip angle of {math.degrees(peak):.0f} deg" if math.isfinite(peak) else "lost"
     elif share := _turns_on(metrics):
         yield f"keeps turning: {share}"
     if STAYS_IN_LANES in metrics and metrics[STAYS_IN_LANES] != 1.0:

@@ -233,5 +233,5 @@ def test_nothing_is_better_or_worse_next_to_a_run_that_is_lost(monkeypatch, caps
     }
     run_command._print_outcomes(recordings)
     told = capsys.readouterr().out
-    assert "none: \x1b[31mlost: sideslip angle of 46 deg\x1b[0m" in told
+    assert "none: \x1b[31mlost with a sideslip angle of 46 deg\x1b[0m" in told
     assert "ars: \x1b[31mhits 2 cones\x1b[0m" in told

@@ -153,7 +153,7 @@ def test_first_screen_says_what_came_out(open_page):
     # Inner text is what is shown; the first paragraphs say what was run.
     for words in (
         "vehicle synthetic",
-        "lost: sideslip angle of 46 deg, leaves the lane by 1.20 m, hits 2 cones",
+        "lost with a sideslip angle of 46 deg, leaves the lane by 1.20 m, hits 2 cones",
         "stays in the lanes",
     ):
         box = page.get_by_text(words).first.bounding_box()

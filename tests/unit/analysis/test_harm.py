@@ -80,7 +80,7 @@ def test_a_car_that_keeps_turning_after_a_sine_with_dwell_is_not_controlled():
         (DWELL, [], []),
         (DWELL | {LATE: -0.76}, ["keeps turning: 76 % of the yaw rate remains after 1.75 s"], []),
         (DWELL | {EARLY: 0.36}, ["keeps turning: 36 % of the yaw rate remains after 1.00 s"], []),
-        (DWELL | {LATE: 0.76, "sideslip_peak_abs_rad": 0.6}, ["lost: sideslip angle of 34 deg"], []),
+        (DWELL | {LATE: 0.76, "sideslip_peak_abs_rad": 0.6}, ["lost with a sideslip angle of 34 deg"], []),
     ],
 )
 def test_a_verdict_says_what_failed_and_what_was_met(metrics: dict[str, float], lost: list[str], met: list[str]):

@@ -131,7 +131,7 @@ LANES_KEPT = {"stays_in_lanes": 1.0, "lane_overstep_m": -0.1, "cones_hit": 0.0, 
 def test_what_went_wrong_stands_at_the_top_in_words():
     lost = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.324, "cones_hit": 1.0, "sideslip_peak_abs_rad": 0.8}
     found = told(through_cones(none=lost, ars=LANES_KEPT))
-    assert found["none"]["losses"] == ["lost: sideslip angle of 46 deg", "leaves the lane by 1.32 m", "hits 1 cone"]
+    assert found["none"]["losses"] == ["lost with a sideslip angle of 46 deg", "leaves the lane by 1.32 m", "hits 1 cone"]
     assert found["ars"]["losses"] == []
     assert found["ars"]["kept"] == ["stays in the lanes", "hits no cone"]
 
@@ -231,7 +231,7 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     runs["runs/step-none.mcap"].metrics["sideslip_peak_rad"] = 1.0
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "2026-01-02" in top
-    assert "lost: sideslip angle of 57 deg" in top
+    assert "lost with a sideslip angle of 57 deg" in top
     assert "Driven with none: speed 95 km/h (maneuver.speed_kmh) in place" in top  # not the other runs
     assert top.count("stays under control") == 2
     better = "\N{CHECK MARK} better"
@@ -580,7 +580,7 @@ def test_lanes_cones_and_sideslip_are_said_with_their_sizes():
     assert outcome(good) == "stays in the lanes, hits no cone, largest sideslip angle 1.500 deg"
     bad = run(stays_in_lanes=0.0, lane_overstep_m=0.5, cones_hit=1.0, sideslip_peak_abs_rad=math.radians(50.0))
     assert outcome(bad) == (
-        "lost: sideslip angle of 50 deg, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
+        "lost with a sideslip angle of 50 deg, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
     )
 
 

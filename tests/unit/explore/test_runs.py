@@ -159,7 +159,7 @@ def test_a_driver_is_offered_where_one_steers(tmp_path: Path) -> None:
 def test_a_run_that_is_lost_says_so_beside_its_figures(tmp_path: Path) -> None:
     choice = RunRequest(maneuver="sine_with_dwell", controllers=("none", "ars"))
     lost, held, _ = (reply.header for reply in Runs(Folder(tmp_path)).run(choice, lambda: False))
-    assert lost["losses"] == ["lost: sideslip angle of 45 deg"]
+    assert lost["losses"] == ["lost with a sideslip angle of 45 deg"]
     assert held["losses"] == []
 
 
