@@ -148,7 +148,9 @@ ROOMS: Final = {
     ),
     "coupling": Room("coupling/*.py coupling/*/*.py", "unit/coupling"),
     "vehicle_builder": Room(
-        "vehicle_builder/*.py", "unit/vehicle_builder", "physics/test_own_cars.py cli/test_vehicle.py"
+        "vehicle_builder/*.py",
+        "unit/vehicle_builder",
+        "unit/vehicle/test_curve_axle.py physics/test_own_cars.py cli/test_vehicle.py",
     ),
     "commands": Room("commands/*.py", "cli", "tools docs"),
     "explore": Room("explore/*.py", "unit/explore cli/test_explore.py"),
