@@ -131,7 +131,11 @@ LANES_KEPT = {"stays_in_lanes": 1.0, "lane_overstep_m": -0.1, "cones_hit": 0.0, 
 def test_what_went_wrong_stands_at_the_top_in_words():
     lost = {"stays_in_lanes": 0.0, "lane_overstep_m": 1.324, "cones_hit": 1.0, "sideslip_peak_abs_rad": 0.8}
     found = told(through_cones(none=lost, ars=LANES_KEPT))
-    assert found["none"]["losses"] == ["lost with a sideslip angle of 46 deg", "leaves the lane by 1.32 m", "hits 1 cone"]
+    assert found["none"]["losses"] == [
+        "lost with a sideslip angle of 46 deg",
+        "leaves the lane by 1.32 m",
+        "hits 1 cone",
+    ]
     assert found["ars"]["losses"] == []
     assert found["ars"]["kept"] == ["stays in the lanes", "hits no cone"]
 
