@@ -122,7 +122,7 @@ class Fault:
             raise ManeuverError(problem, key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
             raise ManeuverError(
-                f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)", key="end_s", value=self.end_s
+                f"is {self.end_s:g} s, but must be after start_s, {self.start_s:g} s", key="end_s", value=self.end_s
             )
         needed = self._needed
         given = [name for name in ("side", *_SIZES, "delay_s") if getattr(self, name) is not None]

@@ -220,8 +220,8 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
     if len(time_s) and (steps < 0.0).any():
         row = int(np.argmax(steps < 0.0))
         raise RecordingError(
-            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; split several runs "
-            "in one file, or cut them with start_s and end_s of a map",
+            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; if the file holds "
+            "several runs, split it, or select one run with start_s and end_s of a map",
             file=file,
         )
     last = np.append(steps > 0.0, True) if len(time_s) else known[:0]

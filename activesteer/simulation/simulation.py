@@ -455,7 +455,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Context in which a run proceeds and its file is written.
+        """Context that writes the run to a file while it proceeds.
 
         Enter the context before the first step.
 

@@ -370,7 +370,7 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Return deflection, rate and slopes as for a left wheel, then deflection and rate with straight curves."""
+    """Return deflection, rate and slopes, then deflection and rate with linear curves, all as for a left wheel."""
     z, vz, s, vs = moved
     f, slope_z = _curve(travel, tc, index, on_travel)
     g, slope_s = 0.0, 0.0

@@ -55,7 +55,7 @@ class Samples:
 
 
 def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
-    """Return the combinations of a design; each grid value meets the same sample of the other factors."""
+    """Return the combinations of a design. Each grid value is combined with the same sample of the other factors."""
     grids = [factor for factor in factors if factor.kind == "grid"]
     sampled = [factor for factor in factors if factor.kind != "grid"]
     if sampled:

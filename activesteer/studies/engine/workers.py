@@ -135,7 +135,7 @@ _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
 
 
 class DaskCluster(Workers):
-    """A Dask cluster, accessed through its client; start its workers, which may come and go, with one thread each."""
+    """A Dask cluster, accessed through its client. Start its workers with one thread each; they may join and leave."""
 
     def __init__(self, client: Any) -> None:
         """Check the cluster. Its client still belongs to the caller."""
