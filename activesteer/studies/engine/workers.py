@@ -333,7 +333,7 @@ class TaskQueue:
                 if task.attempts + 1 < _ATTEMPTS:
                     self._suspects.append(task._replace(attempts=task.attempts + 1))
                 else:
-                    yield Outcome(task.key, None, WorkerDied("the process that did it died (killed, or out of memory)"))
+                    yield Outcome(task.key, None, WorkerDied("its process died (killed, or out of memory)"))
             if died:
                 self._workers.replace()
 
