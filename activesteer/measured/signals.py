@@ -211,7 +211,7 @@ Samples = tuple[Array, Array]
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in order of time, with the last sample of equal times."""
+    """Return the finite samples in order of time, and drop all but the last one of equal times."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file

@@ -395,7 +395,7 @@ def _row(matrix, start, e0, e1, e2, e3, e4):
 
 @inlined
 def _hardened(record, spring, e0, e1, e2, e3, e4):
-    """Return the force of a hardening spring per component of its direction a (see `AxleCurves.hardening`)."""
+    """Return the force of a hardening spring as a factor of its direction a (see `AxleCurves.hardening`)."""
     t = _row(record.hardening, 5 * spring, e0, e1, e2, e3, e4)
     return t * t * (record.square[spring] + t)
 
