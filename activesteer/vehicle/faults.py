@@ -79,7 +79,7 @@ class Faults:
         self._vehicle.act_in_every_step(None)
 
     def take_memory_of(self, other: Faults) -> None:
-        """Copy the memory of the faults at the start of both lists, so that these faults continue."""
+        """Copy the memory of the faults that both lists start with, so that these faults continue."""
         for acting, before in zip(self._acting, other._acting, strict=False):
             acting.memory[:] = before.memory
 
