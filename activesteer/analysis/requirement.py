@@ -196,7 +196,7 @@ class Requirement(Expression):
         word = node.args[0].id if len(node.args) == 1 and isinstance(node.args[0], ast.Name) else ""
         if word not in claims:
             raise self._fail(
-                f"{ast.unparse(node)} needs claims = true and a statement of the runs; {nearest_names(word, claims)};"
+                f"{ast.unparse(node)} needs claims = true and a claim about the runs; {nearest_names(word, claims)};"
             )
         metric, maneuver = claims[word]
         run = EvaluatedRun(NONE, maneuver)

@@ -91,7 +91,7 @@ class _Failures(dict[str, str]):
         type=float, nargs="?", const=5.0),
     arguments.option("--realtime", "FACTOR", "pace the steps to the clock; 2 is twice as fast (default: 1)", type=float,
         nargs="?", const=1.0),
-    arguments.option("--udp", "[HOST:]PORT", "take commands of another process, on this machine by default"),
+    arguments.option("--udp", "[HOST:]PORT", "take commands from another process, on this machine by default"),
     arguments.option("--udp-timeout", "SECONDS", "longest time without a command", 0.1),
     arguments.option("--udp-reaction", ("release", "hold", "stop"),
         "then use the run's own driver and controller, hold the last command, or end the run", "release"),

@@ -132,7 +132,7 @@ def _check_page(file: Path) -> None:
         "widen the corridor by the noise of the measurement, estimated from it (default), or not"),
     arguments.output("FILE.html", "the page (default: no page)"),
     arguments.option("--samples", "N",
-        "with a measured circle: number of samples of what varies from lap to lap (default: 200)",
+        "with a measured circle: number of samples of the values that vary from lap to lap (default: 200)",
         type=int),
     arguments.WORKERS, arguments.JSON,
     description="Find the time shift, and print the share of the measurement inside the tolerance corridor of the "

@@ -31,7 +31,7 @@ def _setting(name: str) -> str:
     arguments.output("DIR", "folder for recordings, report and figures", "runs"),
     arguments.VEHICLE,
     arguments.option("--setting", tuple(SETTINGS),
-        "paper: the most plausible numbers found for what the paper leaves open, selected by the verdicts; "
+        "paper: the most plausible values found for what the paper does not give, selected by the verdicts; "
         "literature: the nominal car with a driver from published ranges (default). Both may be given",
         many=True, dest="settings", type=_setting),
     arguments.JOBS,
@@ -73,7 +73,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     if not options.all:
         lines.append("--all prints every claim with its numbers")
     if "paper" not in settings and options.vehicle == "compact":
-        lines.append("--setting paper drives the most plausible numbers for what the paper leaves open")
+        lines.append("--setting paper drives the most plausible values for what the paper does not give")
     values = tables[0] if len(tables) == 1 else {"settings": tables}
     about = {"figures": list(map(str, figures)), "report": None if report is None else str(report)}
     terminal.tell(options, values | about | {"exit_status": status}, lines)

@@ -51,8 +51,8 @@ SENSORS: Final = {
 """Unit of each sensor's signal, as the suffix of a key. All signals of a controller except the time."""
 
 KINDS: Final = {
-    "stuck": "an actuator stays where it is, a brake or motor at its torque, a sensor at its last reading",
-    "runaway": "an actuator runs to its stop, brake and motor to their strength, a sensor reads the end of its range",
+    "stuck": "an actuator keeps its position, a brake or motor its torque, a sensor its last reading",
+    "runaway": "an actuator runs to its stop, a brake or motor to its largest torque, a sensor to the end of its range",
     "float": "a steering actuator is disconnected from its drive and moves freely",
     "offset": "the demand of an actuator, or the reading of a sensor, has an offset",
     "reversed": "demand or reading has the opposite sign",
@@ -122,7 +122,7 @@ class Fault:
             raise ManeuverError(problem, key="kind", value=self.kind)
         if self.end_s is not None and self.end_s <= self.start_s:
             raise ManeuverError(
-                f"is {self.end_s:g} s; the fault begins at {self.start_s:g} s (start_s)", key="end_s", value=self.end_s
+                f"is {self.end_s:g} s, but must be after start_s, {self.start_s:g} s", key="end_s", value=self.end_s
             )
         needed = self._needed
         given = [name for name in ("side", *_SIZES, "delay_s") if getattr(self, name) is not None]

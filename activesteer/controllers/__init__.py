@@ -1,4 +1,4 @@
-"""Active steering controllers: DriverCommand and Measurement to ActuatorCommand.
+"""Active steering controllers, which map DriverCommand and Measurement to ActuatorCommand.
 
 In: the driver's command and the sensors' measurement.
 Out: demands for rear steering, superposition, brakes and drive.

@@ -178,7 +178,7 @@ class CsvRow(NamedTuple):
 def read_csv(
     path: str | os.PathLike[str], error: type[ActiveSteerError], *, empty_cells_count: bool = False
 ) -> list[CsvRow]:
-    """Read the rows of a CSV; the first line with a separator decides which one applies, `#` starts a comment."""
+    """Read the rows of a CSV file with the separator of the first line that contains one. `#` starts a comment."""
     lines = [line.partition("#")[0] for line in read_text(path, error, limits.MAX_CSV_BYTES).split("\n")]
     separator = next((sign for line in lines for sign in ";\t," if sign in line), ",")
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)

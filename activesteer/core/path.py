@@ -33,7 +33,7 @@ class Path:
 
     @classmethod
     def through(cls, x_m: ArrayLike, y_m: ArrayLike) -> Path:
-        """Lay a cubic spline over the chord length; it overshoots between points of very uneven distance."""
+        """Return a cubic spline through points over the chord length, which overshoots at very uneven distances."""
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - slow to import, and not needed to read a path
 
         x, y = np.asarray(x_m, dtype=np.float64), np.asarray(y_m, dtype=np.float64)

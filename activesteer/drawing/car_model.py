@@ -24,7 +24,7 @@ def scene_of(model: mujoco.MjModel) -> tuple[ScenePart, ...]:
 
 
 def primitives_of(model: mujoco.MjModel) -> tuple[Primitive, ...]:
-    """Return the visible geoms but meshes and planes as solids in their bodies' frames; capsules become cylinders."""
+    """Return the visible geoms, except meshes and planes, as solids in body frames. Capsules become cylinders."""
     solids = []
     for index in range(model.ngeom):
         body = int(model.geom_bodyid[index])

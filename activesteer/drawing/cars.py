@@ -1,4 +1,4 @@
-"""Outlines and bodies of cars for drawings, in no model and no recording; `tools/make_bodies.py` creates them."""
+"""Outlines and bodies of cars, only for drawings; `tools/make_bodies.py` creates them."""
 
 from __future__ import annotations
 

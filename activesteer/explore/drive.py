@@ -320,7 +320,7 @@ class DriveSession:
         return ", ".join(filter(None, (f"{word} {self._last_lap_s + penalty_s:.2f} s", cones)))
 
     def _early(self) -> str:
-        """Describe how far a drive came that did not pass the last gate. Return an empty text without gates."""
+        """Describe the progress of a drive that did not pass the last gate, empty without gates."""
         course = self._simulation.scenario.maneuver.course
         if self._last_lap_s is not None or course is None or course.last_gate_x_m is None:
             return ""

@@ -1,4 +1,4 @@
-"""Manoeuvres past gates: double lane changes of ISO 3888, and the slalom.
+"""Manoeuvres through lanes and cones: double lane changes of ISO 3888, and the slalom.
 
 | section | ISO 3888-1: length, width | ISO 3888-2: length, width |
 |---|---|---|
@@ -103,7 +103,7 @@ _CONE_SPACING_M: Final = 5.0
 
 
 def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane, ...]:
-    """Return entry lane, about y = 0, side lane and exit lane; side 1 is a side lane on the left, -1 on the right."""
+    """Return entry lane (about y = 0), side lane and exit lane. The side lane is on the left (1) or right (-1)."""
     b = vehicle_width_m
     entry = 1.1 * b + 0.25
     # Name, start, length, width, and offset of the centre line [m].
@@ -129,7 +129,7 @@ def lanes(layout: LaneLayout, vehicle_width_m: float, side: float) -> tuple[Lane
 
 
 def cones(course: Sequence[Lane]) -> NDArray[np.float64]:
-    """Return points at most 5 m apart along lane edges, by the standards tangents to the feet of the cones."""
+    """Return points on the lane edges, which the bases of the cones touch, at most 5 m apart."""
     points: list[tuple[float, float]] = []
     for lane in course:
         gaps = math.ceil((lane.end_x_m - lane.start_x_m) / _CONE_SPACING_M)
@@ -318,7 +318,7 @@ def _middle(course: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=64)  # runs of a study mostly have the same lanes
 def _least_jerk_path(course: tuple[Lane, ...], half_width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a straight line to the first lane, then the path of least jerk to the middle of the last lane's end."""
+    """Return a straight line to the first lane, then a path of least jerk to the middle of the end of the last lane."""
     start, end = course[0].start_x_m, course[-1].end_x_m
     end_y = 0.5 * (course[-1].right_y_m + course[-1].left_y_m)
     path = least_jerk(start, end, end_y, list(_bounds(course, half_width_m)))

@@ -92,7 +92,7 @@ def without_effect(slopes: Sequence[Array]) -> list[int]:
 
 
 def indistinguishable(slopes: Sequence[Array]) -> list[int]:
-    """Return the parameters that cannot be told apart, empty if there are none."""
+    """Return the parameters whose effects cannot be distinguished, empty if there are none."""
     _, sizes, combinations = np.linalg.svd(np.concatenate(slopes) / _effects(slopes), full_matrices=False)
     if sizes[-1] > _SAME:
         return []

@@ -127,13 +127,13 @@ def suspicions(channels: Mapping[str, Array], step_s: float = 0.01) -> list[str]
     if not signed and roll is not None and ay is not None and _alike(roll, ay) < -_ALIKE:
         signed = True
         found.append(
-            "roll_rad and ay_mps2 are of opposite sign: a car rolls to the outside of the turn, so roll_rad is "
+            "roll_rad and ay_mps2 have opposite signs: a car rolls to the outside of the turn, so roll_rad is "
             'positive to the left, or all are in axes of SAE J670 (axes = "sae_j670" in a map)'
         )
     if not signed and rate is not None and wheel is not None and _alike(wheel, rate) < -_ALIKE:
         found.append(
-            "steering_wheel_rad and yaw_rate_radps are of opposite sign: one of them is positive to the right, the "
-            "steering wheel where ay_mps2 agrees with the yaw rate"
+            "steering_wheel_rad and yaw_rate_radps have opposite signs: one of them is positive to the right, namely "
+            "the steering wheel if ay_mps2 and the yaw rate have the same sign"
         )
     if speed is not None and rate is not None and wheel is not None and not found:
         found += _against_steering(speed, rate, wheel)
@@ -149,7 +149,7 @@ def _against_acceleration(product: Array, ay: Array, wheel: Array | None) -> lis
         guilty = "one of them is"
         if wheel is not None and abs(_alike(wheel, ay)) > _ALIKE:
             guilty = "ay_mps2 is" if _alike(wheel, ay) < 0.0 else "yaw_rate_radps is"
-        found.append(f"ay_mps2 and yaw_rate_radps are of opposite sign: {guilty} positive to the right")
+        found.append(f"ay_mps2 and yaw_rate_radps have opposite signs: {guilty} positive to the right")
     found += _unit_words(abs(float(product @ ay / (product @ product))))
     return found
 
@@ -167,7 +167,9 @@ def _unit_words(ratio: float) -> list[str]:
         if abs(math.log(ratio / would)) < _NEAR:
             guesses.append((sum(map(abs, powers)), abs(math.log(ratio / would)), powers))
     if not guesses:
-        return [f"ay_mps2 is {ratio:.2g} times speed x yaw rate, nearly 1 in a car: a unit of the three is wrong"]
+        return [
+            f"ay_mps2 is {ratio:.2g} times speed x yaw rate, but nearly 1 in a car: one of the three units is wrong"
+        ]
     found = []
     for power, (name, (size, wrong, right)) in zip(min(guesses)[2], _MISTAKES.items(), strict=True):
         factor = size**power
@@ -188,12 +190,12 @@ def _against_steering(speed: Array, rate: Array, wheel: Array) -> list[str]:
     elif gain > 1.0 / _SHORTEST_M:
         looks = (
             "is too small even for the angle of the road wheels (0.1 to 0.4); it looks like rad that were taken as deg "
-            "(0.2 to 1.7), or has a scale of its own: give its `factor` in a map, or fit steering.factor"
+            "(0.2 to 1.7), or has another scale: give its `factor` in a map, or fit steering.factor"
         )
     elif gain > _STEER_RANGE[1]:
         looks = "looks like the angle of the road wheels, or rad that were taken as deg"
     return [
-        f"the yaw rate is {gain:.2g} 1/m of speed times steering wheel angle, 0.003 to 0.03 is a car: "
+        f"the yaw rate is {gain:.2g} 1/m times speed x steering wheel angle; in a car it is 0.003 to 0.03: "
         f"steering_wheel_rad {looks}"
     ] if looks else []  # fmt: skip
 
@@ -209,7 +211,7 @@ Samples = tuple[Array, Array]
 
 
 def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
-    """Return the finite samples in order of time, with the last sample of equal times."""
+    """Return the finite samples in order of time, and drop all but the last one of equal times."""
     if time_s.shape != values.shape or time_s.ndim != 1:
         raise RecordingError(
             f"{name} has {values.shape} values at {time_s.shape} times; one value a time is needed", file=file
@@ -220,8 +222,8 @@ def samples(name: str, time_s: Array, values: Array, file: str) -> Samples:
     if len(time_s) and (steps < 0.0).any():
         row = int(np.argmax(steps < 0.0))
         raise RecordingError(
-            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; split several runs "
-            "in one file, or cut them with start_s and end_s of a map",
+            f"the time of {name} goes backwards, from {time_s[row]:g} to {time_s[row + 1]:g} s; if the file holds "
+            "several runs, split it, or select one run with start_s and end_s of a map",
             file=file,
         )
     last = np.append(steps > 0.0, True) if len(time_s) else known[:0]

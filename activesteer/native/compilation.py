@@ -70,7 +70,10 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def inlined_by_llvm(function: Callable[..., Any]) -> Any:
-    """Decorate a long function as `inlined` does. numba does not copy it into the caller, so it compiles faster."""
+    """Decorate a long function that LLVM inlines into its caller.
+
+    It compiles faster than with `inlined`, because numba does not copy its code into the caller.
+    """
     _know_shared()
     return njit(forceinline=True, error_model="numpy")(function)
 

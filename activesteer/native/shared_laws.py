@@ -18,7 +18,7 @@ def shared(function: _Function) -> _Function:
 
 
 def law_of(kind: type[Any]) -> Callable[[_Function], _Function]:
-    """Decorate a function of block, command and measurement, returning first fields of `ActuatorCommand`, as a law."""
+    """Decorate a law: it maps block, command and measurement to the first fields of `ActuatorCommand`."""
 
     def decorate(function: _Function) -> _Function:
         kind.law = staticmethod(function)

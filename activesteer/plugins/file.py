@@ -31,7 +31,7 @@ _PARAMETER: Final = re.compile(r"([A-Za-z_]\w*)=(.*)", re.DOTALL)
 
 
 def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, bytes]]:
-    """Load the file; return class or function, typed parameters, and contents of file and imports by path."""
+    """Load a user's file: class or function, typed parameters, and the contents of file and imports by path."""
     # The file can import modules next to it. Every call loads the file and these modules again.
 
     def fail(problem: str, value: Any = text, allowed: Any = None) -> Exception:

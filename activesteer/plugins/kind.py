@@ -131,7 +131,7 @@ class Kind:
             if width:
                 self._fill(given, name, value)
             elif value is not None:
-                raise self.fail("", f"{name} cannot be given to a batch", value)
+                raise self.fail("", f"{name} is not allowed for a batch; leave it out", value)
         return rows
 
     def _fill(self, rows: Array, name: str, value: Any) -> None:

@@ -93,7 +93,7 @@ class Records:
         first = start + _RECORD.size
         self.position = first + length
         if opcode in _REFUSED:
-            raise RecordingError(f"a record has opcode {opcode}", value=opcode)
+            raise RecordingError(f"a record has opcode {opcode}, which is not allowed at this place", value=opcode)
         if self.position > size:
             raise RecordingError(f"a record of {length} bytes reaches beyond the end")
         if opcode in _READ:
@@ -171,7 +171,7 @@ _END_OF_TIME_NS: Final = 2**35 * 10**9
 
 
 def read_mcap(path: Path) -> tuple[dict[str, Any], str]:
-    """Read a file of `McapWriter`; return the arguments of `Recording`, and a description of the damage."""
+    """Read a file of `McapWriter`, and return the arguments of `Recording` and a description of the damage."""
     # A file that ends too early, as after a killed process, gives its complete blocks, and a damaged file the part
     # before the damage. The values of a long recording are its rows, still in the file; its poses are then None.
     descriptor = opened(path)

@@ -436,7 +436,7 @@ def nanoseconds(time_s: ArrayLike, what: str, after_ns: int = -1) -> NDArray[np.
         row = int(np.argmax(steps <= 0))
         before_s = (result[row] - steps[row]) * 1e-9
         raise RecordingError(
-            f"must increase: row {row} is at {times[row]} s, the one before it at {before_s} s",
+            f"must increase: row {row} is at {times[row]} s, but the row before it at {before_s} s",
             key=what,
             value=float(times[row]),
         )

@@ -80,7 +80,7 @@ def check_target(path: str | Path, *, overwrite: bool = True) -> None:
 
 
 def open_target(path: Path, *, overwrite: bool) -> BinaryIO:
-    """Create a locked file that replaces an existing one, which a process that has opened it keeps."""
+    """Create a locked file in place of an existing one. Processes that have opened the old file can still read it."""
     check_target(path, overwrite=overwrite)
     with writing(path, RecordingError):
         if path.is_file():

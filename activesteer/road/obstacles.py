@@ -143,7 +143,7 @@ class Obstacle:
             )
         if steep and self.length_m is not None and self.length_m < 2.0 * self.edge_m:
             raise ManeuverError(
-                f"is {self.length_m:g} m; two edges of edge_m = {self.edge_m:g} m need more", key="length_m"
+                f"is {self.length_m:g} m; it must exceed two edges of edge_m = {self.edge_m:g} m", key="length_m"
             )
 
     @property

@@ -309,7 +309,7 @@ _SAMPLES: Final = 200
 
 
 def changed(scenario: Scenario, key: str, value: Any, controller: Plugin, time_s: float) -> tuple[str, Scenario]:
-    """Change a key during a run; return the block to make anew, `controller`, `driver` or "", and the scenario."""
+    """Change a key, and return the block to create again (`controller`, `driver` or "") and the changed scenario."""
     value = plain({key: value})[key]
     owned = own_controllers([controller])
     part, path = part_of(key, type(scenario.maneuver), owned)

@@ -1,4 +1,4 @@
-"""Batch of many cars with individual numbers, driven by one native call without Python's lock."""
+"""Batch of many cars with individual parameters, driven by one native call without Python's lock."""
 
 from __future__ import annotations
 
@@ -383,7 +383,7 @@ def _steps(steps: Any, n: int) -> NDArray[np.intp]:
         if np.issubdtype(given.dtype, np.integer) and given.ndim < 2 and (given >= 0).all():
             return np.broadcast_to(np.minimum(given, _MOST_STEPS).astype(np.intp), n)
     raise ParameterError(
-        f"is {shown(steps)}; a whole number of steps, 0 or more, or {n} of them, is needed", key="steps", value=steps
+        f"is {shown(steps)}; expected one whole number of 0 or more, or {n} such numbers", key="steps", value=steps
     )
 
 

@@ -107,7 +107,7 @@ def scene_for(
 
 
 def drive(simulation: ClosedLoop, scene: RenderScene, viewer: Any, pacer: FramePacer, keys: Keys) -> tuple[float, bool]:
-    """Drive and show a manoeuvre; return the simulated time [s], and whether it was driven to its end."""
+    """Drive and show a manoeuvre, and return the simulated time [s] and whether it was driven to its end."""
     vehicle, timestep_s = simulation.vehicle, simulation.vehicle.timestep_s
     follow = _Follow(simulation)
     keys.restart = False

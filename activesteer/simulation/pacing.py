@@ -28,7 +28,7 @@ class RealtimePacer:
         self._late_s = np.empty(4096)
 
     def await_step(self) -> None:
-        """Wait for the next step; a late one is not skipped, later ones begin at once until the run has caught up."""
+        """Wait for the time of the next step. Late steps are not skipped, but begin at once."""
         now_s = time.perf_counter()
         if self._start_s is None:
             self._start_s = now_s

@@ -38,7 +38,7 @@ MAX_KEPT_VALUES: Final = 2**25
 _COARSE_S: Final = 5e-4
 """Step from which longitudinal tyre forces on short obstacles are coarse [s]: they move by 10 % in a millisecond."""
 _COARSE: Final = (
-    "steps are long for a short obstacle: longitudinal tyre forces on it may be off by a tenth of their range, "
+    "the time step is long for a short obstacle: longitudinal tyre forces may be wrong by a tenth of their range, "
     "on a stiff tyre by more; timestep_s=0.00025 is finer"
 )
 
@@ -455,7 +455,7 @@ class Simulation(Copyable):
 
     @contextmanager
     def recorded_to(self, path: Path) -> Iterator[None]:
-        """Context in which a run proceeds and its file is written.
+        """Context that writes the run to a file while it proceeds.
 
         Enter the context before the first step.
 

@@ -159,7 +159,7 @@ def examination_page(result: Examination) -> Page:
 
 
 def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section]:
-    """Return a subsection for each title: a table and the plots of the same runs stand together."""
+    """Return a subsection for each title, with the table and the plots of the same runs."""
     parts = []
     for title in dict.fromkeys(part.title for part in (*tables, *pictures)):
         own = [table for table in tables if table.title == title]
@@ -169,7 +169,7 @@ def _parts(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[Section
 
 
 def _is_empty(picture: Picture) -> bool:
-    """Return whether a picture has no point, as that of runs that failed at once."""
+    """Return whether a figure has no points, for example because its runs failed at the start."""
     return not any(isinstance(panel, Heat) or any(np.size(it.x) for it in panel.curves) for panel in picture.panels)
 
 

@@ -370,7 +370,7 @@ def _curve(table, cubics, index, place):
 
 @inlined
 def _strain(record, travel, tc, rack, rc, index, q, v, moved, on_travel, on_rack):
-    """Return deflection, rate and slopes as for a left wheel, then deflection and rate with straight curves."""
+    """Return deflection, rate and slopes, then deflection and rate with linear curves, all as for a left wheel."""
     z, vz, s, vs = moved
     f, slope_z = _curve(travel, tc, index, on_travel)
     g, slope_s = 0.0, 0.0
@@ -395,7 +395,7 @@ def _row(matrix, start, e0, e1, e2, e3, e4):
 
 @inlined
 def _hardened(record, spring, e0, e1, e2, e3, e4):
-    """Return the force of a hardening spring per component of its direction a (see `AxleCurves.hardening`)."""
+    """Return the force of a hardening spring as a factor of its direction a (see `AxleCurves.hardening`)."""
     t = _row(record.hardening, 5 * spring, e0, e1, e2, e3, e4)
     return t * t * (record.square[spring] + t)
 

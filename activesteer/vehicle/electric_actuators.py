@@ -294,7 +294,7 @@ class ElectricActuator:
         """Reject a key without effect."""
         for item in fields(self):
             if not self.has_motor and item.name != "preset" and (value := getattr(self, item.name)) is not None:
-                problem = f"has no effect on the {self.MODEL}, whose numbers are in the model"
+                problem = f"has no effect on the {self.MODEL}, whose values are in the car's model"
                 name = next(iter(presets_of(type(self))))
                 raise ParameterError(f"{problem}; preset {name} has a motor", key=item.name, value=value)
 

@@ -30,7 +30,7 @@ class Faults:
     """The faults of a run."""
 
     def __init__(self, vehicle: Vehicle, faults: Sequence[Fault] = ()) -> None:
-        """Look up the faulty parts, and add sensors to the brakes if a sensor may fail."""
+        """Look up the faulty parts, and insert sensors for the brakes if a sensor can fail."""
         self._vehicle = vehicle
         self._acting: list[_Acting] = []
         vehicle.put_sensors_between(wanted=any(fault.part in SENSORS for fault in faults))
@@ -79,7 +79,7 @@ class Faults:
         self._vehicle.act_in_every_step(None)
 
     def take_memory_of(self, other: Faults) -> None:
-        """Adopt the memory of the faults that both lists start with, so that they continue."""
+        """Copy the memory of the faults that both lists start with, so that these faults continue."""
         for acting, before in zip(self._acting, other._acting, strict=False):
             acting.memory[:] = before.memory
 

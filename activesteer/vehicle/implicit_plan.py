@@ -275,7 +275,7 @@ class ImplicitPlan:
         return (*_options(self._model.opt), mujoco.get_mjcb_control())
 
     def follow(self) -> None:
-        """Renew the plan if its data have changed; this takes two microseconds if nothing has changed."""
+        """Renew the plan if its data have changed. Without changes, this takes two microseconds."""
         state = watch(*self._watch)
         if state == UNCHANGED and self._current_settings() == self._settings:
             return
@@ -392,7 +392,7 @@ def _chain(model: mujoco.MjModel, body: int) -> list[int]:
 
 
 def _elimination(cliques: Sequence[NDArray[Any]], size: int) -> tuple[NDArray[np.intp], list[NDArray[np.intp]]]:
-    """Return an order of elimination with little fill: always the unknown with the fewest neighbours first."""
+    """Return an order of elimination with little fill-in: the unknown with the fewest neighbours comes next."""
     meets = np.eye(size, dtype=bool)
     for clique in cliques:
         meets[np.ix_(clique, clique)] = True

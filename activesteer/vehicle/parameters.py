@@ -320,7 +320,7 @@ class VehicleParameters:
         lag = self.factors.servo_lag
         if lag != 1.0 and self.rear_actuator.has_motor and self.superposition_actuator.has_motor:
             raise ParameterError(
-                "has no effect on screws and a geared motor, whose lag follows from their own numbers",
+                "has no effect on screws and a geared motor, whose lag follows from their own keys",
                 key="factors.servo_lag",
                 value=lag,
             )

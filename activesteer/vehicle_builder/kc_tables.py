@@ -303,7 +303,7 @@ def check_signs(tests: dict[str, Samples]) -> None:
 
 
 def unusual(axle: str, tests: dict[str, Samples]) -> Iterator[str]:
-    """Return questions about unusual measurements."""
+    """Return remarks on unusual measurements."""
     for row in _CHECKS["unusual"]:
         name, channel, unit = row["test"], row["channel"], row["unit"]
         if axle not in row.get("axles", (axle,)) or name not in tests:

@@ -354,13 +354,13 @@ def _contradictions(table: CarTable) -> Iterator[str]:
         given = {key for group in (*_ONE_OF, *_TOGETHER) for key in group if getattr(part, key, None) is not None}
         for group in _ONE_OF:
             if len(ways := [way for way in group if way in given]) > 1:
-                yield f"{path}: {' and '.join(ways)} say the same; give one of them"
+                yield f"{path}: {' and '.join(ways)} have the same meaning; give one of them"
         for group in _TOGETHER:
             if len(given.intersection(group)) == 1:
                 yield f"{path}: {' and '.join(group)} belong together; give both"
     mass = table.mass
     if (mass.total_kg is None) == (mass.chassis_kg is None):
-        yield "mass: total_kg (of the whole car) or chassis_kg is needed, one of them"
+        yield "mass: either total_kg (of the whole car) or chassis_kg is needed"
     if mass.total_kg is not None and (mass.front_fraction is None or mass.cg_height_m is None):
         yield "mass: with total_kg, front_fraction and cg_height_m are needed"
     if mass.chassis_kg is not None and mass.chassis_cg is None:
@@ -378,7 +378,7 @@ def _name_problems(table: CarTable, kinds: Mapping[str, AxleKind]) -> Iterator[s
                 yield f"{axle}.{key}: follows from the hardpoints of a {kind.name} axle"
         for key in ("toe_rad", "camber_rad", "spring_on", "damper_on", "wheel_rate_Npm", "ride_frequency_Hz"):
             if getattr(given, key) is not None and kind.guided:
-                yield f"{axle}.{key.replace('_rad', '_deg')}: an axle of curves has it from its measurements"
+                yield f"{axle}.{key.replace('_rad', '_deg')}: an axle of curves takes it from the measurements"
         missing = [name for name in kind.needed if name not in given.points]
         if missing:
             yield f"{axle}.points: a {kind.name} axle also needs {', '.join(missing)}"

@@ -147,7 +147,7 @@ def _wheels(axle: Axle) -> list[int]:
 def _swept(
     held: HeldCar, cases: list[Case], order: Array, rack: Array | None = None
 ) -> tuple[Array, Array, Array, Array]:
-    """Return poses and loads of a sweep, and of the standing car; fill `rack` with the travel of the rack [m]."""
+    """Return poses and loads of a sweep and of the standing car, and write the rack travel to `rack` [m]."""
     held.reset()
     standing, standing_loads = _poses(held), held.load_N.copy()
     poses, loads = np.empty((len(cases), 4, 6)), np.empty((len(cases), 4))

@@ -77,7 +77,7 @@ def test_new_says_all_that_is_wrong_with_a_table(call: Call, tmp_path: Path) -> 
     assert told.status == 1
     assert "did you mean 'strut_top'" in told.err
     assert "also needs strut_top, strut_bottom, lca_front_inner" in told.err
-    assert "mass: total_kg (of the whole car) or chassis_kg is needed" in told.err
+    assert "mass: either total_kg (of the whole car) or chassis_kg is needed" in told.err
     assert "not in metres" in told.err
     assert not (tmp_path / "vehicles").exists()
 

@@ -33,7 +33,7 @@ def measured() -> Recording:
 def test_the_files_are_imported_with_the_scale_of_the_steering_as_the_only_doubt(measured: Recording) -> None:
     notes = import_file(FILES, FOLDER / "map.toml").metadata["measured"]["notes"]
     assert [note for note in notes if "time begins" not in note] == [
-        note for note in notes if "has a scale of its own" in note
+        note for note in notes if "has another scale" in note
     ]
     assert len(notes) == 2
     # Values of the README, read from the files by hand.

@@ -115,8 +115,8 @@ def _contents(anchors: Mapping[str, Group], cards: Sequence[Scorecard]) -> Secti
         if card.judged:
             about.append(f"{card.judged[0].claim.id} to {card.judged[-1].claim.id} about {group.title}")
     note = (
-        f"The paper's statements: {'; '.join(about)}. \N{CHECK MARK} the runs show it, \N{NOT EQUAL TO} they do not, "
-        "and the report gives the reason; \N{BALLOT X} they do not, unexpectedly."
+        f"Claims of the paper: {'; '.join(about)}. \N{CHECK MARK} reproduced; \N{NOT EQUAL TO} not reproduced, with a "
+        "reason in the report; \N{BALLOT X} not reproduced, unexpectedly."
     )
     heads = ["Manoeuvre, run", "Result", *([HEADLINE] if has_headline else [])]
     rows = [line[: len(heads)] for line in lines]
@@ -177,7 +177,7 @@ def _sections(group: Group, anchor: str, card: Scorecard, title: str) -> list[Se
     compared = Table("", heads, rows, kind="results", numbers=len(titles), note=note)
     first = Section(title, told_first, [compared] if len(heads) > 1 else [], anchor=anchor)
     details = [_claim(item, anchor) for item in card.judged]
-    claims = Section("What the paper claims", points=details, level=3, kind="claims")
+    claims = Section("Claims of the paper", points=details, level=3, kind="claims")
     told = [f"The claims of the paper are not judged: {card.obstacle}."] if card.obstacle and not card.judged else []
     told += [f"{each[0].upper()}{each[1:]}." for each in notes({run.name: run.metrics for run in group.runs})]
     told += [f"{run.name}: {NOT_FOLLOWED}" for run in group.runs if not follows_steering(run.recording)]

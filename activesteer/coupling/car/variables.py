@@ -96,7 +96,7 @@ def inputs_of(loop: ClosedLoop, road_mu: float) -> list[Variable]:
     ]
 
 
-FAULT_KINDS: Final = ("works", "stuck", "runaway to the left or to its strength", "runaway to the right", "float",
+FAULT_KINDS: Final = ("works", "stuck", "runaway to the left or to the largest torque", "runaway to the right", "float",
                       "reversed", "dropout")  # fmt: skip
 """Kinds of an actuator's fault by the number that the input takes, as in car.c."""
 

@@ -50,7 +50,7 @@ class Link(NamedTuple):
 
 
 class Signals(NamedTuple):
-    """Signals of messages, by name."""
+    """Signals that a set of messages contains, by name."""
 
     places: Mapping[str, tuple[Place, ...]]  # name -> its numbers
     others: frozenset[str]  # names of fields that are not numbers
@@ -63,7 +63,7 @@ class Signals(NamedTuple):
 
 
 def signals_of(messages: Sequence[type[Any]]) -> Signals:
-    """Return the signals of messages: a field of the wheels is one signal of four numbers, and four of one."""
+    """Return the signals of messages. A field of the wheels gives one signal of four numbers and one for each wheel."""
     # If several messages have a field, its name means the first of them; `message.field` means any of them.
     places: dict[str, tuple[Place, ...]] = {}
     others = set()

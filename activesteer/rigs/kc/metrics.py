@@ -70,7 +70,7 @@ class Axle(NamedTuple):
         return self.measured.sweeps[name]
 
     def slope(self, sweep: str, values: Array, over: Array | None = None) -> Array:
-        """Return the slopes of the axle's wheels about static ride, shape (2,)."""
+        """Return the slope of a quantity at static ride for both wheels of the axle, shape (2,)."""
         x = self.sweep(sweep).x
         near = np.abs(x) <= _SMALL[sweep.split("_", maxsplit=1)[0]] * (1.0 + 1e-9)
         rows = values[near][:, self.wheels]

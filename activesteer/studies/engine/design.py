@@ -55,7 +55,7 @@ class Samples:
 
 
 def draw(factors: Sequence[Factor], kind: str, count: int, seed: int, stream: int = 0) -> Samples:
-    """Return the combinations of a design; each grid value meets the same sample of the other factors."""
+    """Return the combinations of a design. Each grid value is combined with the same sample of the other factors."""
     grids = [factor for factor in factors if factor.kind == "grid"]
     sampled = [factor for factor in factors if factor.kind != "grid"]
     if sampled:
@@ -123,7 +123,7 @@ def read_cases(path: Path) -> Samples:
     header, *body = rows
     keys = header.cells
     if len(set(keys)) != len(keys) or "" in keys:
-        raise fail(f"every column of the cases needs a key of its own, found {shown(keys)}", header.line)
+        raise fail(f"every column of the cases needs a different key; found {shown(keys)}", header.line)
     found: list[dict[str, Value]] = []
     for line, cells in body:
         if len(cells) != len(keys):
@@ -147,7 +147,7 @@ def choose_design(table: DesignTable, factors: Sequence[Factor], has_cases: bool
         wanted = "needs design.cases" if kind == "list" else f"design.cases belongs to a list, not to {kind}"
         raise source.fail(where, wanted)
     if kind == "list" and factors:
-        raise source.fail(("factors",), "a list of cases names its keys itself; leave [factors] out")
+        raise source.fail(("factors",), "the list of cases already names the keys; leave [factors] out")
     if kind == "grid" and not all_grids:
         other = next(factor for factor in factors if factor.kind != "grid")
         raise source.fail(where, f"is grid, but {other.key} is {other.kind}; give a grid there or another design")

@@ -86,7 +86,7 @@ class FactorValues:
             for key, value in relative.items():
                 if not isinstance(value, int | float) or isinstance(value, bool):
                     raise study.source.fail(
-                        ("factors", key, "nominal"), f"is {shown(value)} in {label}: nothing can be relative to it"
+                        ("factors", key, "nominal"), f"is {shown(value)} in {label}: no value can be relative to it"
                     )
             self._nominal[place] = relative
         return self._nominal[place]

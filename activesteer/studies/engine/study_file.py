@@ -19,8 +19,8 @@ from activesteer.studies.engine.design import DesignTable, Samples, cases, choos
 from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
 SEARCHES: Final = {
-    "tune": "it says what is to be minimised, satisfied or violated",
-    "fit": "it says which channels are compared, and how noisy they are",
+    "tune": "it defines what to minimise, satisfy or violate",
+    "fit": "it defines the compared channels and their noise",
 }
 """Tables of searches, which choose the factor values themselves; each with a hint for a missing table."""
 _KEPT: Final = ("none", "failed", "all")

@@ -72,9 +72,10 @@ def read_table(study: StudyFile) -> TuneTable:
     if "objectives" in given or not isinstance(given.get("constraints", {}), Mapping):
         raise source.fail(
             (TABLE, "objectives" if "objectives" in given else "constraints"),
-            "lists of tables are now lines of expressions: [tune.minimise] with lines such as response = "
-            '"min(abs(yaw_rate_overshoot(ars, step_steer) / yaw_rate_overshoot(none, step_steer)), 2)", and '
-            '[tune.constraints] with lines such as turns = "lateral_displacement_m(ars, sine_with_dwell) >= 1.83"',
+            "lists of tables are no longer supported; write a line for each expression: [tune.minimise] with lines "
+            'such as response = "min(abs(yaw_rate_overshoot(ars, step_steer) / yaw_rate_overshoot(none, step_steer)), '
+            '2)", and [tune.constraints] with lines such as '
+            'turns = "lateral_displacement_m(ars, sine_with_dwell) >= 1.83"',
         )
     table = build(TuneTable, given, source, (TABLE,))
     goals = [goal for goal in Goal if getattr(table, goal)]

@@ -135,7 +135,7 @@ _SAME: Final = ("distributed", "dask", "cloudpickle", "msgpack")
 
 
 class DaskCluster(Workers):
-    """A Dask cluster, accessed through its client; start its workers, which may come and go, with one thread each."""
+    """A Dask cluster, accessed through its client. Start its workers with one thread each; they may join and leave."""
 
     def __init__(self, client: Any) -> None:
         """Check the cluster. Its client still belongs to the caller."""
@@ -333,7 +333,7 @@ class TaskQueue:
                 if task.attempts + 1 < _ATTEMPTS:
                     self._suspects.append(task._replace(attempts=task.attempts + 1))
                 else:
-                    yield Outcome(task.key, None, WorkerDied("the process that did it died (killed, or out of memory)"))
+                    yield Outcome(task.key, None, WorkerDied("its process died (killed, or out of memory)"))
             if died:
                 self._workers.replace()
 

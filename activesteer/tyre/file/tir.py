@@ -133,7 +133,7 @@ def _version_without_fittyp(words: Mapping[str, str], source: Path) -> float:
     model = words.get("PROPERTY_FILE_FORMAT", "PAC2002").upper()
     if not model.startswith(("PAC2002", "USER", "MF")):
         raise TyreFileError(
-            f"{model[:60]!r} is not a Magic Formula that can be read here; allowed: PAC2002, and files with FITTYP "
+            f"{model[:60]!r} is not a supported tyre model; supported: PAC2002, and files with FITTYP "
             "5, 6, 21, 52, 60, 61 or 62",
             file=str(source),
             key="PROPERTY_FILE_FORMAT",

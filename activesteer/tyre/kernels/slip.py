@@ -244,7 +244,7 @@ MIN_RELAXATION_LENGTH_M: Final = 0.02
 
 @compiled
 def rolling_relaxation_lengths(p, fz_N: float, gamma_rad: float, pressure_Pa: float):
-    """Return the relaxation lengths of a rolling tyre [m]: of a tread block if slip is to build up at once."""
+    """Return the relaxation lengths of a rolling tyre [m], or of a tread block if relaxation is off."""
     if p.RELAXATION_OFF != 0.0:
         return MIN_RELAXATION_LENGTH_M, MIN_RELAXATION_LENGTH_M
     return relaxation_lengths(p, fz_N, gamma_rad, pressure_Pa)

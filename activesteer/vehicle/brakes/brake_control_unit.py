@@ -33,7 +33,7 @@ def ask(setup, state, pedal, asked_Nm):
 
 @compiled
 def flow(setup, state, pedal):
-    """Advance the pressures by one step: up to its pressure the pedal feeds a brake, beyond it the pump does."""
+    """Advance the pressures by one step. The pedal feeds a brake up to the pedal pressure, and the pump beyond it."""
     # The torque of a brake is its torque per pressure, 2 mu_pad A_piston r_effective, times the pressure.
     fed = pedal_pressure(setup, pedal)
     for wheel in range(4):

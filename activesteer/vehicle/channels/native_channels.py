@@ -55,7 +55,7 @@ class Column(NamedTuple):
 
 
 class AxialForce(NamedTuple):
-    """Axial force of a tendon, tension positive, a polynomial in the elongation and slack between two lengths."""
+    """Axial force of a tendon, tension positive: a polynomial in the elongation, and zero between two lengths."""
 
     tendon: int
     stiffness_Npm: float

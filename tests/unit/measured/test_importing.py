@@ -165,7 +165,7 @@ def test_several_units_that_nobody_said_are_suspected_together_and_milliseconds_
     right = {"speed_mps": SPEED_MPS, "yaw_rate_radps": RATE_RADPS, "ay_mps2": AY_MPS2}
     assert suspicions(right, 0.01) == []
     assert "steps of 10 s" in suspicions(right, 10.0)[0]
-    assert "a unit of the three is wrong" in suspicions({**right, "ay_mps2": 1e5 * AY_MPS2})[0]
+    assert "one of the three units is wrong" in suspicions({**right, "ay_mps2": 1e5 * AY_MPS2})[0]
 
 
 def test_a_car_that_rolls_into_the_turn_is_suspected():
@@ -281,10 +281,10 @@ def test_gaps_are_bridged_as_long_as_the_map_allows(tmp_path):
         ({"ay_mps2": 1.0 / 9.81}, "g that were taken as m/s2"),
         ({"ay_mps2": -1.0}, "ay_mps2 is positive to the right"),
         ({"yaw_rate_radps": -1.0}, "yaw_rate_radps is positive to the right"),
-        ({"steering_wheel_rad": -1.0}, "steering_wheel_rad and yaw_rate_radps are of opposite sign"),
+        ({"steering_wheel_rad": -1.0}, "steering_wheel_rad and yaw_rate_radps have opposite signs"),
         ({"steering_wheel_rad": math.degrees(1.0)}, "deg that were taken as rad"),
         ({"steering_wheel_rad": 1.0 / 16.0}, "angle of the road wheels, or"),
-        ({"steering_wheel_rad": 1.0 / 48.0}, "has a scale of its own: give its `factor`"),
+        ({"steering_wheel_rad": 1.0 / 48.0}, "has another scale: give its `factor`"),
     ],
 )
 def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):

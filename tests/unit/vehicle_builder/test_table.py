@@ -99,7 +99,7 @@ def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: st
         (
             "spring_rate_Npm = 24730",
             "spring_rate_Npm = 24200\nwheel_rate_Npm = 24000",
-            "say the same; give one of them",
+            "have the same meaning; give one of them",
         ),
         ('spring_on = "knuckle"', 'spring_on = "spring_lnk"', "did you mean 'spring_link'"),
         ("total_kg = 1430", "", "total_kg (of the whole car) or chassis_kg is needed"),

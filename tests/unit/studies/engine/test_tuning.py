@@ -194,7 +194,7 @@ def test_a_metric_that_only_the_examined_run_lacks_is_a_violation(
         (changed(GAINS, constraints=[{"metric": "ay", "low": 1.0}]), "tune.constraints", "[tune.constraints]"),
         ({**STUDY, "match": {"evaluations": 60}}, "match", "[tune.satisfy]"),
         ({**STUDY, "falsify": {"requirement": "harm(controller) <= 1"}}, "falsify", "violate ="),
-        (STUDY, "tune", "minimised, satisfied or violated"),
+        (STUDY, "tune", "minimise, satisfy or violate"),
     ],
 )  # fmt: skip
 def test_a_wrong_table_is_refused_before_anything_runs(tmp_path: Path, table: dict[str, Any], key: str, words: str):
