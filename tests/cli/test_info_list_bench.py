@@ -177,6 +177,12 @@ def test_version_is_told(capsys):
     assert capsys.readouterr().out == f"activesteer {__version__}\n"
 
 
+def test_the_command_line_is_also_a_module():
+    command = [sys.executable, "-m", "activesteer", "--version"]
+    told = subprocess.run(command, cwd=Path(__file__).resolve().parents[2], capture_output=True, text=True, check=True)
+    assert told.stdout == f"activesteer {__version__}\n"
+
+
 @pytest.mark.parametrize("words", [[], ["fly"], ["run"], ["info"]])
 def test_misused_command_line_is_told_with_its_usage(capsys, words):
     with pytest.raises(SystemExit) as stop:

@@ -584,7 +584,8 @@ def test_lanes_cones_and_sideslip_are_said_with_their_sizes():
     assert outcome(good) == "stays in the lanes, hits no cone, largest sideslip angle 1.500 deg"
     bad = run(stays_in_lanes=0.0, lane_overstep_m=0.5, cones_hit=1.0, sideslip_peak_abs_rad=math.radians(50.0))
     assert outcome(bad) == (
-        "lost with a sideslip angle of 50 deg, leaves the lane by 0.50 m, hits 1 cone, largest sideslip angle 50.000 deg"
+        "lost with a sideslip angle of 50 deg, leaves the lane by 0.50 m, hits 1 cone, "
+        "largest sideslip angle 50.000 deg"
     )
 
 
