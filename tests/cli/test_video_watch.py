@@ -66,6 +66,7 @@ def test_watch_without_a_display_says_so_and_what_to_do(call, monkeypatch):
         (["step_ster"], ["no manoeuvre is named 'step_ster'", "did you mean 'step_steer'"]),
         (["step_steer", "--realtime", "1e-3"], ["--realtime: is 0.001, must be 0.01 to 100"]),
         (["step_steer", "--set", "road.mu"], ["KEY=VALUE is needed"]),
+        (["step_steer", "-c", "none", "-c", "ars"], ["-c: give one controller with --watch"]),
     ],
 )
 def test_watch_says_what_is_wrong_before_it_looks_for_a_display(call, words, texts):
