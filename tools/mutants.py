@@ -146,7 +146,7 @@ ROOMS: Final = {
         "unit/faults unit/controllers unit/maneuver cli/test_errors.py unit/recording unit/simulation/test_changes.py "
         "unit/vehicle/test_motors.py",
     ),
-    "coupling": Room("coupling/*.py coupling/*/*.py", "unit/coupling"),
+    "coupling": Room("coupling/*.py coupling/*/*.py", "unit/coupling unit/simulation/test_by_the_clock.py"),
     "vehicle_builder": Room(
         "vehicle_builder/*.py",
         "unit/vehicle_builder",
