@@ -5,8 +5,10 @@ angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
 
     M_z = J_z / T_r (error beyond its band) + J_z / T_b^2 (sideslip beyond its limit)
 
-with the error of the yaw rate, desired minus actual. The outer front wheel creates a moment against the turn
-(oversteer), which also lowers its side force. The inner rear wheel creates a moment with the turn (understeer):
+with the error of the yaw rate, desired minus actual. The controller acts only as far as the estimate is certain: the
+friction that limits the desired yaw rate includes its standard deviation, and the limit of the sideslip angle is at
+least three of its deviations. The outer front wheel creates a moment against the turn (oversteer), which also lowers
+its side force. The inner rear wheel creates a moment with the turn (understeer):
 
     brake torque = |M_z| rolling radius / (half the track)
 
@@ -21,7 +23,7 @@ from __future__ import annotations
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Estimate, Measurement
 
 
 class Esc:
@@ -43,11 +45,11 @@ class Esc:
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
         desired = self._reference.borne(
-            command.front_steer_demand_rad, now.speed_mps, now.friction, measurement.ay_mps2
+            command.front_steer_demand_rad, now.speed_mps, assumed_friction(p, now), measurement.ay_mps2
         )
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(yaw_rate_desired_radps=desired, estimate=now)
-        moment = self._yaw_inertia_kgm2 * stabilising(p, desired - now.yaw_rate_radps, now.sideslip_rad)
+        moment = self._yaw_inertia_kgm2 * stabilising(p, desired - now.yaw_rate_radps, now)
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
         braked = max(torques)  # of the only wheel that brakes
         limited = braked >= p.torque_limit_Nm
@@ -66,10 +68,15 @@ def beyond(value: float, band: float) -> float:
     return value - band if value > band else value + band if value < -band else 0.0
 
 
-def stabilising(p: EscParameters, error_radps: float, sideslip_rad: float) -> float:
-    """Return the demanded yaw acceleration M_z / J_z for a yaw rate error and a sideslip angle [rad/s2]."""
+def assumed_friction(p: EscParameters, now: Estimate) -> float:
+    """Return the friction that limits the desired yaw rate."""
+    return now.friction + p.friction_deviations * now.friction_std
+
+
+def stabilising(p: EscParameters, error_radps: float, now: Estimate) -> float:
+    """Return the demanded yaw acceleration M_z / J_z for a yaw rate error and the estimated sideslip angle [rad/s2]."""
     error = beyond(error_radps, p.yaw_rate_band_radps)
-    slide = beyond(sideslip_rad, p.sideslip_limit_rad)
+    slide = beyond(now.sideslip_rad, max(p.sideslip_limit_rad, p.sideslip_deviations * now.sideslip_std_rad))
     return error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2
 
 

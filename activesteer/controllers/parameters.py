@@ -113,6 +113,12 @@ class EscParameters(YawMomentParameters):
 
     yaw_rate_band_radps: _Gain
     """Yaw rate error that causes no action [rad/s]."""
+    friction_deviations: Annotated[float, Range(0.0, 10.0)]
+    """Standard deviations of the friction that are added to it for the desired yaw rate [-]: the controller acts on the
+    friction only as far as the estimate is certain."""
+    sideslip_deviations: Annotated[float, Range(0.0, 10.0)]
+    """Least limit of the sideslip angle, in standard deviations of its estimate [-]: the controller acts only on a
+    sideslip angle that is certain."""
     torque_limit_Nm: Annotated[float, Range(0.0, 1e4)]
     """Largest brake torque at a wheel [Nm]."""
     least_speed_mps: Annotated[float, Range(1.0, 20.0)]
