@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.series import rms
 from activesteer.config import Range, build, field_in_unit
 from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
@@ -221,7 +223,7 @@ def fit(
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
-        found = search(problem.answers_by(workers, progress), problem.start, problem.check)
+        found = search(partial(problem.answers, workers, progress), problem.start, problem.check)
     return problem.result(found)
 
 
@@ -254,38 +256,32 @@ class _Problem:
         self.settings: Settings = self._plan.settings
         start = np.array([_start(factor, table, first, study) for factor in study.factors])
         self.start = (start - self._low) / (self._high - self._low)
-        self.runs = 0
+        self.runs, self._rounds, self._best = 0, 0, math.nan
 
     def _factor_values(self, place: Array) -> dict[str, Any]:
         values = self._low + (self._high - self._low) * place
         return dict(zip(self._study.keys, values.tolist(), strict=True))
 
-    def answers_by(self, workers: Workers, progress: FitProgress) -> Callable[[list[Array]], list[Answer]]:
-        """Return a function that repeats every recording with each of several sets of parameters, on the workers."""
-        rounds, best = 0, math.nan
-
-        def answers(places: list[Array]) -> list[Answer]:
-            nonlocal rounds, best
-            rounds += 1
-            queue = TaskQueue(workers)
-            for number, place in enumerate(places):
-                for recording, measured in enumerate(self._measured):
-                    overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
-                    times = {name: time_s for name, (time_s, _) in measured.channels.items()}
-                    queue.add((number, recording), drive, self.settings, recording, overrides, times)
-            driven: dict[tuple[int, int], dict[str, Array] | str] = {}
-            total = len(places) * len(self._measured)
-            for outcome in queue.outcomes():
-                driven[outcome.key] = outcome.result()
-                self.runs += 1
-                progress(rounds, len(driven), total, best)
-            found = [self._answer([driven[number, each] for each in range(len(self._measured))])
-                     for number in range(len(places))]  # fmt: skip
-            if not isinstance(found[0], str):
-                best = np.fmin(best, _misfit(found[0]))
-            return found
-
-        return answers
+    def answers(self, workers: Workers, progress: FitProgress, places: list[Array]) -> list[Answer]:
+        """Repeat every recording with each of several sets of parameters, on the workers."""
+        self._rounds += 1
+        queue = TaskQueue(workers)
+        for number, place in enumerate(places):
+            for recording, measured in enumerate(self._measured):
+                overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
+                times = {name: time_s for name, (time_s, _) in measured.channels.items()}
+                queue.add((number, recording), drive, self.settings, recording, overrides, times)
+        driven: dict[tuple[int, int], dict[str, Array] | str] = {}
+        total = len(places) * len(self._measured)
+        for outcome in queue.outcomes():
+            driven[outcome.key] = outcome.result()
+            self.runs += 1
+            progress(self._rounds, len(driven), total, self._best)
+        found = [self._answer([driven[number, each] for each in range(len(self._measured))])
+                 for number in range(len(places))]  # fmt: skip
+        if not isinstance(found[0], str):
+            self._best = np.fmin(self._best, rms(np.concatenate(found[0])))
+        return found
 
     def _answer(self, driven: Sequence[dict[str, Array] | str]) -> Answer:
         series = []
@@ -337,7 +333,7 @@ class _Problem:
         everywhere = {factor.key for factor in self._study.factors if not factor.maneuvers}
         overrides = [factors.overrides(number, 0, values) for number in range(len(self._measured))]
         return Fit(
-            parameters, correlations, compared, self._table.intervals, freedom, _misfit(found.after),
+            parameters, correlations, compared, self._table.intervals, freedom, rms(np.concatenate(found.after)),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
@@ -369,7 +365,3 @@ def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> 
     if isinstance(here, (int, float)) and not isinstance(here, bool) and factor.low <= here <= factor.high:
         return float(here)
     return 0.5 * (factor.low + factor.high)
-
-
-def _misfit(series: Sequence[Array]) -> float:
-    return math.sqrt(float(np.mean(np.concatenate(series) ** 2)))
