@@ -106,6 +106,11 @@ def crossing_time(time_s: Array, values: Array, level: float) -> float:
     return float(time_s[i] + fraction * (time_s[i + 1] - time_s[i]))
 
 
+def value_at(time_s: Array, values: Array, at_s: float) -> float:
+    """Return the interpolated value at a time, or nan after the end of the run."""
+    return float(np.interp(at_s, time_s, values)) if at_s <= time_s[-1] else math.nan
+
+
 def largest_rate(values: Array, timestep_s: float) -> float:
     """Return the largest rate of change over `RATE_SPAN_S`."""
     # Unlike the slope of a smoothed signal it does not overshoot.

@@ -29,6 +29,7 @@ from activesteer.analysis.series import (
     offset,
     peak,
     timestep,
+    value_at,
     zeroing_range,
 )
 from activesteer.analysis.source import RecordingLike, entry
@@ -146,7 +147,7 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         "yaw_rate_reversal_peak_time_s": top_s,
     }
     for instant_s in INSTANTS_S:
-        later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
+        later = -times.side * value_at(time_s, yaw_rate, times.completion_s + instant_s)
         values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / top
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
@@ -204,8 +205,8 @@ def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, fl
 
 def _displacement(recording: RecordingLike, times: Steering) -> float:
     time_s = recording.time_s
-    x0, y0, yaw = (_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
-    x1, y1 = (_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
+    x0, y0, yaw = (value_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
+    x1, y1 = (value_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
     return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
 
 
@@ -217,8 +218,3 @@ def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> fl
     # Each acceleration is weighted with the remaining time: one integral replaces two.
     instants_s = np.linspace(begin_s, end_s, 1 + round(DISPLACEMENT_TIME_S / timestep(time_s)))
     return float(np.trapezoid((end_s - instants_s) * np.interp(instants_s, time_s, ay_mps2), instants_s))
-
-
-def _at(time_s: Array, values: Array, instant_s: float) -> float:
-    """Return the interpolated value at a time, or nan after the end of the run."""
-    return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

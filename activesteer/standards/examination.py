@@ -110,7 +110,7 @@ def examine(
             try:
                 found[label] = EXAMINED_BY[standard.name](runner)
             except NoResult as reason:
-                found[label] = Findings.without_result(reason)
+                found[label] = Findings({"error": str(reason)}, f"no result: {reason}")
     today = datetime.datetime.now(tz=datetime.UTC).date()
     return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
 

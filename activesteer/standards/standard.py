@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from activesteer.analysis.series import value_at
 from activesteer.config import Range
 from activesteer.core.conventions import CURVE_STEP_S, Array
 from activesteer.core.metric_table import metric
@@ -60,7 +61,7 @@ class StandardRun:
     def at(self, channel: str, time_s: float) -> float:
         """Return the interpolated value of a channel at a time, or nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
-        return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
+        return value_at(self.time_s, values, time_s) if len(values) else math.nan
 
     @property
     def values(self) -> dict[str, Any]:
@@ -146,11 +147,6 @@ class Findings:
     summary: str  # verdict or findings in a sentence
     tables: Sequence[Table] = field(default_factory=tuple)
     pictures: Sequence[Picture] = field(default_factory=tuple)
-
-    @classmethod
-    def without_result(cls, reason: NoResult) -> Findings:
-        """Return the findings of a car that cannot be tested."""
-        return cls({"error": str(reason)}, f"no result: {reason}")
 
     @property
     def error(self) -> str:

@@ -370,12 +370,10 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
 
 
 def disk(alpha: float) -> tuple[float, float]:
-    """Return centre and radius of the disk that the loop gain avoids, for a disk margin.
+    """Return centre and radius of the disk that the loop gain avoids, for a balanced disk margin from 0 to 2 [-].
 
     It holds all L with |1 + L| < alpha / 2 |1 - L|, on whose edge a factor of the size alpha makes the loop marginal.
-
-    Args:
-        alpha: Balanced disk margin, above 0 and below 2 [-]; at 2 the disk is a half-plane.
+    At 2 the disk is a half-plane.
 
     Source: P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, 2020, section IV.
     """
