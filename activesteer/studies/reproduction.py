@@ -65,7 +65,6 @@ class Reproduction:
 def reproduce(
     folder: str | os.PathLike[str],
     vehicle: FileOrTable = "compact",
-    overrides: Mapping[str, Any] | None = None,
     *,
     setting: str = LITERATURE,
     jobs: int | None = None,
@@ -82,7 +81,7 @@ def reproduce(
             f"is a setting of the {VEHICLE}; leave out --vehicle", key=f"--setting {PAPER}", value=vehicle
         )
     numbers = read_setting(setting)
-    scenarios = {name: resolve(name, vehicle, {**numbers.overrides(name), **(overrides or {})}) for name in SCENARIOS}
+    scenarios = {name: resolve(name, vehicle, numbers.overrides(name)) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)
     paths = {name: {system: target / f"{name}-{system}.mcap" for system in SYSTEMS} for name in scenarios}
     result = Reproduction(paths, setting=setting)

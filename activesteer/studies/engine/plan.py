@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.config import leaves
 from activesteer.controllers import keys_read, load_controller
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.scenario import Scenario, check_gains, describe, resolve
@@ -129,9 +130,11 @@ def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorVa
                 if key in factor_values.overrides(*place, {key: values[0]}):
                     effective.add(key)
                 continue
-            described = _described(factor_values, place, samples[0], key, values)
-            changed = {leaf for other in described for leaf in _differing(described[0], other)}
-            if any(_is_read(leaf, base, study.controllers) for leaf in changed):
+            one, *others = _described(factor_values, place, samples[0], key, values)
+            differing = (
+                path for other in others for path in one.keys() | other.keys() if one.get(path) != other.get(path)
+            )
+            if any(_is_read(path, base, study.controllers) for path in differing):
                 effective.add(key)
     try:
         check_gains(study.overrides, study.controllers)
@@ -158,7 +161,7 @@ def _resolved(
 
 def _described(
     factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
-) -> list[dict[str, Any]]:
+) -> list[dict[tuple[str, ...], Any]]:
     """Return the inputs of a run at each value of a key, with the other keys from the first sample if possible."""
     study = factor_values.study
     conditions = next((factor.conditions for factor in study.factors if factor.key == key), {})
@@ -203,29 +206,14 @@ def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[An
     return found
 
 
-def _leaves(scenario: Scenario) -> dict[str, Any]:
-    """Return all inputs of a run by dotted key."""
-    return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
+def _leaves(scenario: Scenario) -> dict[tuple[str, ...], Any]:
+    """Return all inputs of a run by path."""
+    return leaves(describe(scenario) | {"overrides": {}, "files": scenario.files})
 
 
-def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from _walk(item, f"{path}.{key}" if path else str(key))
-    elif isinstance(value, list):
-        for number, item in enumerate(value):
-            yield from _walk(item, f"{path}.{number}")
-    else:
-        yield path, value
-
-
-def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
-    return {key for key in a.keys() | b.keys() if a.get(key) != b.get(key)}
-
-
-def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
+def _is_read(path: tuple[str, ...], scenario: Scenario, controllers: Sequence[str]) -> bool:
     """Return whether a key affects any run: a gain needs its controller, a preview needs a path."""
-    part, first, *rest = [*leaf.split("."), "", ""]
+    part, first, *rest = [*path, "", ""]
     follows_path = scenario.maneuver.course is not None
     if part == "files":
         return True

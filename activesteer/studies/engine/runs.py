@@ -18,7 +18,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -66,9 +66,9 @@ def source_digest() -> str:
     package = Path(__file__).parents[2]
     found = {}
     for part in _DECIDING:
-        inside = (path for path in (package / part).rglob("*") if path.suffix in (".py", ".txt"))
-        for path in [package / part] if part.endswith(".py") else sorted(inside):
-            found[path.relative_to(package).as_posix()] = path.read_bytes()
+        for path in sorted((package / part).rglob("*")):
+            if path.suffix in (".py", ".txt"):
+                found[path.relative_to(package).as_posix()] = path.read_bytes()
     return digest(found)[:12]
 
 
@@ -76,12 +76,7 @@ def source_digest() -> str:
 def versions() -> dict[str, str]:
     """Return the versions of activesteer, its sources and its dependencies."""
     found = {"activesteer": __version__, "source": source_digest(), "python": platform.python_version()}
-    for package in ("mujoco", "numpy", "scipy", "numba"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+    return found | {package: version(package) for package in ("mujoco", "numpy", "scipy", "numba")}
 
 
 def deciding_versions() -> dict[str, str]:

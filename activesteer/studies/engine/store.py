@@ -135,7 +135,7 @@ class Store:
         if (self.folder / RESULTS).exists():
             return []
         found, begin = [], 0
-        for first, last in self._spans():
+        for first, last in sorted(tuple(map(int, path.stem.split("-"))) for path in self._paths()):
             if first > begin:
                 found.append(range(begin, first))
             begin = max(begin, last + 1)
@@ -190,11 +190,6 @@ class Store:
             found = json.loads((self.folder / _WITHOUT_EFFECT).read_text(encoding="utf-8"))
             return [str(key)[:_KEY_CHARACTERS] for key in found] if isinstance(found, list) else []
         return []
-
-    def _spans(self) -> list[tuple[int, int]]:
-        return sorted(
-            (int(first), int(last)) for first, _, last in (path.stem.partition("-") for path in self._paths())
-        )
 
     def _paths(self) -> list[Path]:
         return sorted(self._parts.glob("[0-9]*.parquet"))

@@ -27,6 +27,9 @@ _KEPT: Final = ("none", "failed", "all")
 _LISTS: Final = ("maneuvers", "controllers", "vehicles", "metrics", "curves")
 """Keys with a list, or with its only name."""
 
+Place = tuple[int, int, int]
+"""Numbers of manoeuvre, vehicle and controller in their lists."""
+
 
 def label_of(item: FileOrTable) -> str:
     """Return the name of a manoeuvre, vehicle or controller in the results."""
@@ -82,6 +85,12 @@ class StudyFile(_Common):
     def keys(self) -> tuple[str, ...]:
         """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
+
+    def place_of(self, row: Mapping[str, Any]) -> Place:
+        """Return the numbers of manoeuvre, vehicle and controller of a row of the results."""
+        parts = ((self.maneuvers, "maneuver"), (self.vehicles, "vehicle"), (self.controllers, "controller"))
+        maneuver, vehicle, controller = ([*map(label_of, items)].index(row[part]) for items, part in parts)
+        return maneuver, vehicle, controller
 
     def to_table(self) -> dict[str, Any]:
         """Return the study as the table of a study file."""

@@ -132,7 +132,6 @@ def tune(
     trials: int | None = None,
     runs: int | None = None,
     jobs: int | None = None,
-    client: Any = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> list[Tuning]:
@@ -150,7 +149,7 @@ def tune(
         raise StudyError(f"{folder} holds a study; use a new folder for the search", value=folder)
     searches = _searches(read_study(study_file, TABLE), folder, controllers, maneuvers)
     _optuna()
-    with workers_for(jobs, client=client, scheduler=scheduler) as workers:
+    with workers_for(jobs, scheduler=scheduler) as workers:
         return [search.run(workers, trials, runs, progress) for search in searches]
 
 

@@ -28,11 +28,9 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import groupby
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -51,7 +49,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.core.signals import Measurement
-from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
@@ -352,8 +350,8 @@ _LEAD: Final = (
 )
 
 
-def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str | os.PathLike[str]) -> Path:
-    """Write `margins.html` and return its path."""
+def margins_page(found: Sequence[LoopMargins], vehicle: str) -> Page:
+    """Return the page of the margins."""
     loops = sorted(found, key=_name)  # the speeds of a loop stay in their order
     drawn = [each for each in loops if each.curves]
     sections = [Section(tables=[_table(loops)], pictures=[_picture(drawn)] if drawn else [])]
@@ -366,7 +364,7 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
     ]
     if drawn:
         lead.append(_LEAD)
-    return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
+    return Page(f"activesteer linearise: {vehicle}", title, lead, sections)
 
 
 def disk(alpha: float) -> tuple[float, float]:
