@@ -31,7 +31,7 @@ from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import Settings, prepare, scenario_of
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
+from activesteer.studies.engine.workers import Workers, in_parallel, workers_for
 
 
 @dataclass(frozen=True)
@@ -265,20 +265,19 @@ class _Problem:
     def answers(self, workers: Workers, progress: FitProgress, places: list[Array]) -> list[Answer]:
         """Repeat every recording with each of several sets of parameters, on the workers."""
         self._rounds += 1
-        queue = TaskQueue(workers)
-        for number, place in enumerate(places):
+        calls, count = [], len(self._measured)
+        for place in places:
             for recording, measured in enumerate(self._measured):
                 overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
                 times = {name: time_s for name, (time_s, _) in measured.channels.items()}
-                queue.add((number, recording), drive, self.settings, recording, overrides, times)
-        driven: dict[tuple[int, int], dict[str, Array] | str] = {}
-        total = len(places) * len(self._measured)
-        for outcome in queue.outcomes():
-            driven[outcome.key] = outcome.result()
+                calls.append((self.settings, recording, overrides, times))
+
+        def report(_: int, done: int) -> None:
             self.runs += 1
-            progress(self._rounds, len(driven), total, self._best)
-        found = [self._answer([driven[number, each] for each in range(len(self._measured))])
-                 for number in range(len(places))]  # fmt: skip
+            progress(self._rounds, done, len(calls), self._best)
+
+        driven = in_parallel(drive, calls, report=report, workers=workers)
+        found = [self._answer(driven[first : first + count]) for first in range(0, len(driven), count)]
         if not isinstance(found[0], str):
             self._best = np.fmin(self._best, rms(np.concatenate(found[0])))
         return found

@@ -227,14 +227,11 @@ def _overlays(parts: Sequence[Panel | Heat]) -> bool:
 
 
 def _in_one_colour(panel: Panel, name: str, colour: str) -> Iterator[Curve]:
-    looks = ((colour, _LINE),) if len(panel.curves) == 1 else ((_pale(colour), _WIDE), (colour, _THIN))
+    pale = "#" + "".join(f"{round(255 * _PALE + (1.0 - _PALE) * part):02x}" for part in bytes_of(colour))
+    looks = ((colour, _LINE),) if len(panel.curves) == 1 else ((pale, _WIDE), (colour, _THIN))
     for curve, (own, width) in zip(panel.curves, looks, strict=False):
         label = f"{name}, {curve.label}" if curve.label else name
         yield curve._replace(label=label, colour=own, dashes=curve.dashes and "-", width=width)
-
-
-def _pale(colour: str) -> str:
-    return "#" + "".join(f"{round(255 * _PALE + (1.0 - _PALE) * part):02x}" for part in bytes_of(colour))
 
 
 def _verdict(found: Findings) -> Markup:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -61,20 +60,18 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
     """Draw kinematics and compliance of a car as PNG files, and all of them on the page `kc.html`."""
     pictures = _pictures(result)
     paths = save_all(pictures, folder, f"{result.vehicle}: ")
-    return [*paths, _write_page(result, [make() for make in pictures.values()], Path(folder))]
+    return [*paths, _write_page(result, [*pictures.values()], Path(folder))]
 
 
-def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
-    pictures: dict[str, Callable[[KcResult], Picture]] = {
-        **({"targets": _targets} if result.targeted else {}),
-        "rear_camber": _rear_camber,
-        **{name: partial(_drawn_grid, grid=grid) for name, grid in _GRIDS.items()},
-        "opposite_travel": _opposite_travel,
-        "steering": _steering,
+def _pictures(result: KcResult) -> dict[str, Picture]:
+    return {
+        **({"targets": _targets(result)} if result.targeted else {}),
+        "rear_camber": _rear_camber(result),
+        **{name: _drawn_grid(result, grid) for name, grid in _GRIDS.items()},
+        "opposite_travel": _opposite_travel(result),
+        "steering": _steering(result),
+        **({"rear_steering": _rear_steering(result)} if "rear_steering_bump" in result.curves else {}),
     }
-    if "rear_steering_bump" in result.curves:
-        pictures["rear_steering"] = _rear_steering
-    return {name: partial(make, result) for name, make in pictures.items()}
 
 
 def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:

@@ -116,7 +116,8 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     values = {metric.name: values[metric.name] * metric.unit.factor for metric in found}
     who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
     groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
-    shown = _shown_rows(table)
+    # Evenly spread, complete samples keep paired runs together.
+    shown = np.flatnonzero(table["sample"].to_numpy() % -(-table.num_rows // _SHOWN_ROWS) == 0)
     shown_table = table.take(pa.array(shown))
     return {
         "controllers": who["controller"][0],
@@ -143,13 +144,6 @@ def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
     """Return the distinct values of a column in order of occurrence, and the index of each row's value."""
     encoded = column.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
-
-
-def _shown_rows(table: pa.Table) -> Places:
-    """Return the rows of evenly spread, complete samples, which keep paired runs together."""
-    samples = table["sample"].to_numpy()
-    every = -(-table.num_rows // _SHOWN_ROWS)
-    return np.flatnonzero(samples % every == 0)
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:

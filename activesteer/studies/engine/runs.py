@@ -51,13 +51,8 @@ _DECIDING: Final = (
 
 def digest(value: Any) -> str:
     """Return the hash of JSON values that may contain bytes."""
-    return hashlib.sha256(json.dumps(value, sort_keys=True, default=_of_bytes).encode()).hexdigest()
-
-
-def _of_bytes(value: object) -> str:
-    if not isinstance(value, bytes):
-        raise TypeError(f"{type(value).__name__} has no hash that is the same everywhere")
-    return hashlib.sha256(value).hexdigest()
+    text = json.dumps(value, sort_keys=True, default=lambda content: hashlib.sha256(content).hexdigest())
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @functools.cache
@@ -264,14 +259,10 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
         if rows and time.monotonic() >= end_s:
             break
         rows += _drive_sample(settings, list(group))
-    _give_memory_back()
-    return rows
-
-
-def _give_memory_back() -> None:
-    """Return free memory to the system. The C library would otherwise fragment it."""
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
+    # Return free memory to the system. The C library would otherwise fragment it; others have no such function.
+    with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
+    return rows
 
 
 _seen: dict[str, str] = {}
