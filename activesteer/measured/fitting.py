@@ -345,8 +345,8 @@ def drive(
 ) -> dict[str, Array] | str:
     """Drive once, and return the compared channels, or the reason for a failure."""
     try:
-        scenario = scenario_of(settings, recording, 0, overrides)
-        run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
+        scenario = scenario_of(settings.study, recording, 0, overrides)
+        run = run_scenario(scenario, settings.study.controllers[0], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)
     run = at_sensor(run)

@@ -32,28 +32,26 @@ class Plan:
         self.study = study
         self.samples = study.samples()
         self._values = FactorValues(study)
-        labelled = {key: _labelled(study, key) for key in ("maneuvers", "vehicles", "controllers")}
+        labels = {key: _labels(study, key) for key in ("maneuvers", "vehicles", "controllers")}
         self.settings = Settings(
             replace(study, case_list=None, **dict.fromkeys(SEARCHES)),
-            **labelled,
             folder=None if study.recordings == "none" else folder,
             named=tuple(self._named()),
             expected={},
         )
         _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
-        table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", *SEARCHES)}
+        table = {key: value for key, value in study.to_table().items() if key not in (*labels, "title", *SEARCHES)}
         table["design"] = [samples.columns for samples in self.samples]
         self._maneuver_of: list[int] | None = None
         if study.design.maneuvers == "one":
             order = np.random.default_rng([study.seed, len(study.maneuvers)]).permutation(len(self.samples[0]))
             table["maneuver_of"] = self._maneuver_of = (order % len(study.maneuvers)).tolist()
-        table |= {key: [label for label, _ in labelled[key]] for key in labelled}
-        self.digest = digest({"study": table, "inputs": self.settings.expected})
+        self.digest = digest({"study": table | labels, "inputs": self.settings.expected})
 
     def __len__(self) -> int:
-        shared, driven = self.settings, len(self.settings.maneuvers) if self._maneuver_of is None else 1
-        return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+        driven = len(self.study.maneuvers) if self._maneuver_of is None else 1
+        return driven * len(self.study.vehicles) * len(self.samples[0]) * len(self.study.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
         """Yield indices of manoeuvre and vehicle with overrides, for each combination of string values."""
@@ -74,10 +72,9 @@ class Plan:
 
     def request(self, run: int) -> Request:
         """Return a run by its number."""
-        shared = self.settings
-        place, controller = divmod(run, len(shared.controllers))
+        place, controller = divmod(run, len(self.study.controllers))
         place, sample = divmod(place, len(self.samples[0]))
-        maneuver, vehicle = divmod(place, len(shared.vehicles))
+        maneuver, vehicle = divmod(place, len(self.study.vehicles))
         if self._maneuver_of is not None:
             maneuver = self._maneuver_of[sample]
         samples = self.samples[controller if len(self.samples) > 1 else 0]
@@ -104,14 +101,13 @@ def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> 
         yield from ((*row[:place], value, *row[place + 1 :]) for value in allowed)
 
 
-def _labelled(study: StudyFile, key: str) -> Any:
-    """Label each item with its name without folders, so that results are equal on every machine."""
-    items = getattr(study, key)
-    labels = [label_of(item) for item in items]
+def _labels(study: StudyFile, key: str) -> list[str]:
+    """Return the unique names of the items without folders, so that results are equal on every machine."""
+    labels = [label_of(item) for item in getattr(study, key)]
     for label in labels:
         if labels.count(label) > 1:
             raise study.source.fail((key,), f"two of them have the name {label!r}; names must be unique")
-    return tuple(zip(labels, items, strict=True))
+    return labels
 
 
 def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorValues) -> None:

@@ -127,7 +127,7 @@ def _drive_all(
     total = len(plan)
     left = sum(len(span) for span in missing)
     done, here, failed = total - left, 0, 0
-    size = task_size(left, len(plan.settings.controllers), workers.in_flight)
+    size = task_size(left, len(plan.study.controllers), workers.in_flight)
     tasks = (
         (requests, drive, plan.settings, requests, _KEPT_EVERY_S) for requests in _tasks(plan, missing, size, limit)
     )

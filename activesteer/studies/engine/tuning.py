@@ -211,8 +211,7 @@ class _Search:
         self.plan, self.table, self.folder, self.goal = Plan(study), table, folder, table.goal
         self.examined, self.maneuver = examined, maneuver
         self.judge = Judge(self.plan, table, examined)
-        shared = self.plan.settings
-        items = (shared.maneuvers, shared.vehicles, shared.controllers)
+        items = (study.maneuvers, study.vehicles, study.controllers)
         self._places: Any = list(itertools.product(*(range(len(item)) for item in items)))
         self._seen: Sequence[Row] = ()
 
