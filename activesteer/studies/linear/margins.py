@@ -471,11 +471,13 @@ def worst_margins(
 
         look = functools.partial(_margins, controllers, vehicle, speeds_kmh)
         found = in_parallel(look, [(part,) for part in parts], report=report, workers=workers)
-    every = list(itertools.chain.from_iterable(found))
-    worst = []
-    for row in zip(*every, strict=True):
-        least = min(range(len(row)), key=lambda number: row[number].margins.disk)
-        worst.append(
-            replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
-        )
-    return worst
+    # A car whose controller does not use an actuator lacks its loop.
+    cars_of: dict[tuple[str, str, float], list[LoopMargins]] = {}
+    for request, loops in zip(requests, itertools.chain.from_iterable(found), strict=True):
+        for each in loops:
+            own = replace(each, factors=request.factors)
+            cars_of.setdefault((each.controller, each.loop, each.speed_kmh), []).append(own)
+    return [
+        replace(min(every, key=lambda each: each.margins.disk), margins=weakest([each.margins for each in every]))
+        for every in cars_of.values()
+    ]

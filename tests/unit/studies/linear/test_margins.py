@@ -258,6 +258,15 @@ def test_what_a_study_varies_and_the_speed_are_given_in_one_place():
         loop_margins(["ars"], speeds_kmh=[100.0], overrides={"speed_kmh": 80.0})
 
 
+def test_a_loop_that_some_cars_of_a_study_lack_has_the_margins_of_the_others():
+    key = "controllers.ars.corrector.proportional_gain_s"
+    study = {"maneuvers": ["step_steer"], "controllers": ["ars"], "factors": {key: {"grid": [0.0, 0.25, 0.5]}}}
+    (worst,) = worst_margins(study, ["ars"], speeds_kmh=[100.0], jobs=1)
+    (alone,) = loop_margins(["ars"], speeds_kmh=[100.0], overrides={key: 0.5})
+    assert (worst.controller, worst.loop, worst.factors) == ("ars", "rear", {key: 0.5})
+    assert worst.margins.disk == alone.margins.disk
+
+
 def test_the_disk_of_a_loop_touches_its_curve():
     loop = integrator(0.05)
     centre, radius = disk(margins_of(loop, FREQUENCIES_RADPS).disk)
