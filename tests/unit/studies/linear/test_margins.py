@@ -267,6 +267,15 @@ def test_a_loop_that_some_cars_of_a_study_lack_has_the_margins_of_the_others():
     assert worst.margins.disk == alone.margins.disk
 
 
+def test_command_names_the_text_of_the_car_with_the_smallest_margin(tmp_path, capsys):
+    study = tmp_path / "sensors.toml"
+    factors = '[factors]\n"sensors.preset" = { grid = ["ideal", "production"] }\n'
+    study.write_text(f'maneuvers = ["step_steer"]\n{factors}', encoding="utf-8")
+    arguments = ["--study", str(study), "-c", "ars", "--speed-kmh", "100", "--jobs", "1"]
+    assert main(["linearise", "--loop", "controller", *arguments]) == 0
+    assert "sensors.preset = production" in capsys.readouterr().out
+
+
 def test_the_disk_of_a_loop_touches_its_curve():
     loop = integrator(0.05)
     centre, radius = disk(margins_of(loop, FREQUENCIES_RADPS).disk)
