@@ -193,7 +193,7 @@ def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
-    """Return overlaid plots of several controllers by title, one colour each, or None for a single controller."""
+    """Return overlaid plots of several controllers by title, one colour each; empty for a single controller."""
     looks = run_looks(findings)
     shown = {name: {picture.title: picture for picture in found.pictures} for name, found in findings.items()}
     shown = {name: pictures for name, pictures in shown.items() if pictures}

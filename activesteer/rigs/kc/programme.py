@@ -75,12 +75,12 @@ class Sweep:
 def _read(car: HeldCar) -> dict[str, Array]:
     """Return one point of a sweep as the fields of `Sweep`, with the rotations of the wheels."""
     model, data = car.model, car.data
-    poses = [car.wheel(corner) for corner in range(4)]
+    poses = [_in_vehicle_axes(car, corner) for corner in range(4)]
     wheel = model.joint("steering_wheel")
     return {
-        "centre_m": np.array([pose.centre_m for pose in poses]) - car.origin_m,
+        "centre_m": np.array([pose.centre_m for pose in poses]),
         "rotation": np.array([pose.rotation for pose in poses]),
-        "contact_m": np.array([pose.contact_m for pose in poses]) - car.origin_m,
+        "contact_m": np.array([pose.contact_m for pose in poses]),
         "load_N": car.load_N.copy(),
         "damper_m": np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
         "rack_m": data.qpos[model.joint("rack").qposadr[0]],

@@ -59,7 +59,7 @@ class _Common:
     claims: bool = False  # whether to check the paper's claims for every sample; this needs its three systems
     timestep_s: Annotated[float, Range(1e-9)] = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
     tune: dict[str, Any] | None = None  # the table [tune], unparsed; see `tuning`
-    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fit_file`
+    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fitting`
     title: str = ""  # one line for the report
 
 
