@@ -29,7 +29,7 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.runs import Settings, prepare, scenario_of
+from activesteer.studies.engine.runs import Settings, prepare
 from activesteer.studies.engine.study_file import StudyFile, read_study
 from activesteer.studies.engine.workers import Workers, in_parallel, workers_for
 
@@ -345,7 +345,7 @@ def drive(
 ) -> dict[str, Array] | str:
     """Drive once, and return the compared channels, or the reason for a failure."""
     try:
-        scenario = scenario_of(settings.study, recording, 0, overrides)
+        scenario = settings.study.scenario(recording, 0, overrides)
         run = run_scenario(scenario, settings.study.controllers[0], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)

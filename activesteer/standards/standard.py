@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +21,7 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.studies.engine.runs import CURVE, Status
 from activesteer.studies.engine.study import study
-from activesteer.studies.engine.workers import Workers
+from activesteer.studies.engine.workers import Progress, Workers
 
 _LEAD_S: Final = 0.2
 """Time by which a curve begins before time zero [s]."""
@@ -91,7 +91,7 @@ class StandardRunner:
     overrides: Mapping[str, Any]  # overrides of the car: dotted key -> value
     folder: Path | None  # folder for the studies, which can be resumed; None if they are not kept
     workers: Workers  # processes that make the runs
-    progress: Callable[[str, int, int], None]  # called with the series, number of finished runs, and number of all runs
+    progress: Progress  # called with the series, number of finished runs, and number of all runs
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve a manoeuvre with the car of the runner."""

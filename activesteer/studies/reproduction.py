@@ -7,7 +7,7 @@ made from the files.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,12 +29,9 @@ from activesteer.rigs.kc import rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.workers import TaskQueue, workers_for
+from activesteer.studies.engine.workers import Progress, TaskQueue, workers_for
 from activesteer.studies.linear.identification import single_track_response
 from activesteer.studies.linear.linearisation import linear_response, linearise
-
-Progress = Callable[[str, int, int], None]
-"""Callback with the finished run, the number of finished runs, and the total."""
 
 
 @dataclass

@@ -14,7 +14,7 @@ from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.config import leaves
 from activesteer.controllers import keys_read, load_controller
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.scenario import Scenario, check_gains, describe, resolve
+from activesteer.scenario import Scenario, check_gains, describe
 from activesteer.studies.engine.design import Samples
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.runs import Request, Settings, digest, present_inputs
@@ -146,12 +146,11 @@ def _resolved(
     factor_values: FactorValues, place: tuple[int, int], sample: Mapping[str, Any], key: str = ""
 ) -> Scenario:
     study, (maneuver, vehicle) = factor_values.study, place
-    items = study.maneuvers[maneuver], study.vehicles[vehicle]
     try:
-        overrides = study.overrides | factor_values.overrides(*place, sample)
-        return resolve(*items, overrides, study.driver, study.controllers)
+        return study.scenario(maneuver, vehicle, study.overrides | factor_values.overrides(*place, sample))
     except ActiveSteerError as error:
-        error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
+        where = f"in {label_of(study.maneuvers[maneuver])} with {label_of(study.vehicles[vehicle])}"
+        error.add_note(where + (f", factor {key}" if key else ""))
         raise
 
 

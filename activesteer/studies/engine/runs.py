@@ -34,7 +34,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.plugins.file import format_of, source_of
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario, describe, resolve
+from activesteer.scenario import FileOrTable, Scenario, describe
 from activesteer.simulation import preparation
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
@@ -137,13 +137,8 @@ def present_inputs(settings: Settings) -> dict[str, str]:
     study = settings.study
     places = itertools.product(range(len(study.maneuvers)), range(len(study.vehicles)), [study.overrides])
     for place in (*places, *settings.named):
-        found[files_key(study, *place)] = digest(scenario_of(study, *place).files)
+        found[files_key(study, *place)] = digest(study.scenario(*place).files)
     return found | {f"controller {label_of(each)}": controller_digest(each) for each in study.controllers}
-
-
-def scenario_of(study: StudyFile, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario of a pair of manoeuvre and vehicle."""
-    return resolve(study.maneuvers[maneuver], study.vehicles[vehicle], overrides, study.driver, study.controllers)
 
 
 def files_key(study: StudyFile, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:
@@ -272,7 +267,7 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     study, first = settings.study, requests[0]
     place = first.maneuver, first.vehicle, first.overrides
     try:
-        scenario, key = scenario_of(study, *place), files_key(study, *place)
+        scenario, key = study.scenario(*place), files_key(study, *place)
         if digest(scenario.files) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
         with preparation.not_on_disk():

@@ -14,7 +14,7 @@ from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.core.files import user_path
 from activesteer.errors import StudyError, shown
 from activesteer.resources import DEFAULT_DRIVER, find_study
-from activesteer.scenario import FileOrTable
+from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases
 from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
@@ -85,6 +85,10 @@ class StudyFile(_Common):
     def keys(self) -> tuple[str, ...]:
         """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
+
+    def scenario(self, maneuver: int, vehicle: int, overrides: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of a manoeuvre and a vehicle, by their numbers."""
+        return resolve(self.maneuvers[maneuver], self.vehicles[vehicle], overrides, self.driver, self.controllers)
 
     def place_of(self, row: Mapping[str, Any]) -> Place:
         """Return the numbers of manoeuvre, vehicle and controller of a row of the results."""

@@ -12,7 +12,7 @@ import json
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -29,14 +29,12 @@ from activesteer.studies.engine.runs import Request, Row, Status, drive, prepare
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import StudyFile, label_of, read_study
 from activesteer.studies.engine.tune_table import TABLE, Goal, Judge, TuneTable, read_table
-from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
+from activesteer.studies.engine.workers import Progress, TaskQueue, Workers, workers_for
 
 _STARTUP: Final = 0.2
 """Fraction of the sets that the sampler draws at random before it learns to violate a requirement."""
 _WARM: Final = 10
 """Number of times that a warm start of CMA-ES counts its source: it learns from the best tenth of its sources."""
-Progress = Callable[[str, int, int], None]
-"""Callback after every set, with the name of the search, its finished sets, and their total."""
 
 
 @dataclass(frozen=True)
