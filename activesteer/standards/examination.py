@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -100,11 +101,7 @@ def examine(
         for controller in controllers:
             label = label_of(controller)
             folder = None if output is None else Path(output) / "runs" / file_word(label)
-
-            def tell(series: str, done: int, total: int, label: str = label) -> None:
-                if progress is not None:
-                    progress(label, series, done, total)
-
+            tell = functools.partial(progress or (lambda *_: None), label)
             read = read_by(given, controller)
             runner = StandardRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:

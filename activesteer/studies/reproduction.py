@@ -24,8 +24,7 @@ from activesteer.core.files import make_folder
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.plotting import save
 from activesteer.recording import Recording, check_target
-from activesteer.rigs import kinematics_compliance
-from activesteer.rigs.kc import rear_camber_figure
+from activesteer.rigs.kc import kinematics_compliance, rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
