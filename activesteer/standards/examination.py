@@ -83,7 +83,7 @@ def examine(
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[str, str, int, int], None] | None = None,
+    progress: Callable[[str, str, int, int], None] = lambda *_: None,
 ) -> Examination:
     """Drive and evaluate a standard, one of `catalogue.STANDARDS`, with each controller separately.
 
@@ -101,7 +101,7 @@ def examine(
         for controller in controllers:
             label = label_of(controller)
             folder = None if output is None else Path(output) / "runs" / file_word(label)
-            tell = functools.partial(progress or (lambda *_: None), label)
+            tell = functools.partial(progress, label)
             read = read_by(given, controller)
             runner = StandardRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:

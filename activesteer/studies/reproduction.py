@@ -64,7 +64,7 @@ def reproduce(
     *,
     setting: str = LITERATURE,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> Reproduction:
     """Drive all five scenarios with all three systems and check the paper's claims.
 
@@ -88,8 +88,7 @@ def reproduce(
     for done, (name, system, problem) in enumerate(drive(scenarios, result.paths, jobs), 1):
         if problem:
             result.failures[name, system] = problem
-        if progress is not None:
-            progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
+        progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
     claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
     result.scorecard = scorecard(claims, next(iter(scenarios.values())).car.name, setting=setting)
     return result

@@ -131,7 +131,7 @@ def tune(
     runs: int | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> list[Tuning]:
     """Search the ranges of a study's factors.
 
@@ -213,7 +213,7 @@ class _Search:
         self._places: Any = list(itertools.product(*(range(len(item)) for item in items)))
         self._seen: Sequence[Row] = ()
 
-    def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress | None) -> Tuning:
+    def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress) -> Tuning:
         """Try the remaining sets, and store the result."""
         total = self.table.trials if trials is None else trials
         total = max(1, runs // len(self._places)) if runs is not None else total
@@ -254,7 +254,7 @@ class _Search:
         storage = JournalStorage(journal.JournalFileBackend(str(path), lock_obj=lock))
         return optuna.create_study(storage=storage, study_name=TABLE, load_if_exists=True, directions=directions)
 
-    def _search(self, made: Any, total: int, workers: Workers, progress: Progress | None) -> None:
+    def _search(self, made: Any, total: int, workers: Workers, progress: Progress) -> None:
         states = _optuna().trial.TrialState
         for left in made.get_trials(deepcopy=False, states=(states.RUNNING,)):  # left by a killed process
             made.tell(left.number, state=states.FAIL)
@@ -273,8 +273,7 @@ class _Search:
             for trial, rows, error in TaskQueue(workers).outcomes(self._tasks(made, end - done)):
                 done += 1
                 self._tell(made, trial, [] if error is not None else rows)
-                if progress is not None:
-                    progress(f"{self.examined} {self.maneuver}".strip(), done, total)
+                progress(f"{self.examined} {self.maneuver}".strip(), done, total)
 
     def _tasks(self, made: Any, count: int) -> Iterator[tuple[Any, ...]]:
         for _ in range(count):

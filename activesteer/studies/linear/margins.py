@@ -433,7 +433,7 @@ def worst_margins(
     vehicle: FileOrTable = "compact",
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
-    progress: Callable[[StudyProgress], None] | None = None,
+    progress: Callable[[StudyProgress], None] = lambda _: None,
     *,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -466,8 +466,7 @@ def worst_margins(
         def report(place: int, _: int) -> None:
             nonlocal looked_at
             looked_at += len(parts[place])
-            if progress is not None:
-                progress(StudyProgress(looked_at, len(requests), 0, looked_at))
+            progress(StudyProgress(looked_at, len(requests), 0, looked_at))
 
         look = functools.partial(_margins, controllers, vehicle, speeds_kmh)
         found = in_parallel(look, [(part,) for part in parts], report=report, workers=workers)
