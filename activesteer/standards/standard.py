@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -145,8 +145,8 @@ class Findings:
 
     values: dict[str, Any]  # values that `--json` prints, with `pass` if the standard has limits
     summary: str  # verdict or findings in a sentence
-    tables: Sequence[Table] = field(default_factory=tuple)
-    pictures: Sequence[Picture] = field(default_factory=tuple)
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = ()
 
     @property
     def error(self) -> str:

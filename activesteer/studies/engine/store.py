@@ -160,8 +160,6 @@ class Store:
 
     def read(self) -> pa.Table:
         """Return all rows so far, in the order of the runs."""
-        if (self.folder / RESULTS).exists():
-            return next(_tables([self.folder / RESULTS]))
         return joined(list(_tables(self._paths())) or [table_of([], self._factors)])
 
     def progress(self) -> Progress:
@@ -169,8 +167,7 @@ class Store:
         about = read_environment(self.folder)
         counts: dict[str, int] = {}
         errors: dict[str, int] = {}
-        joined = self.folder / RESULTS
-        for table in _tables([joined] if joined.exists() else self._paths(), ["status", "error"]):
+        for table in _tables(self._paths(), ["status", "error"]):
             for column, found in (("status", counts), ("error", errors)):
                 for entry in table[column].combine_chunks().value_counts().to_pylist():
                     if entry["values"]:
@@ -192,7 +189,8 @@ class Store:
         return []
 
     def _paths(self) -> list[Path]:
-        return sorted(self._parts.glob("[0-9]*.parquet"))
+        results = self.folder / RESULTS
+        return [results] if results.exists() else sorted(self._parts.glob("[0-9]*.parquet"))
 
 
 def read_environment(folder: Path) -> dict[str, Any]:
