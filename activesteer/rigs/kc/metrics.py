@@ -56,11 +56,6 @@ class Axle(NamedTuple):
         """Static wheel loads [N], shape (2,)."""
         return self.measured.static_load_N[self.wheels]
 
-    @property
-    def knuckles(self) -> tuple[str, str]:
-        """Names of the knuckles' bodies."""
-        return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
-
     def sweep(self, name: str) -> Sweep:
         """Return a sweep of the rig."""
         return self.measured.sweeps[name]
@@ -98,7 +93,7 @@ def _ride_rate(axle: Axle) -> float:
 
 def _ride_frequency(axle: Axle) -> float:
     model = axle.measured.vehicle.model
-    unsprung = np.mean([model.body_subtreemass[model.body(name).id] for name in axle.knuckles])
+    unsprung = np.mean([model.body_subtreemass[model.body(f"{axle.name[0]}{side}_knuckle").id] for side in "lr"])
     sprung = axle.load_N.mean() / GRAVITY_MPS2 - unsprung
     return math.sqrt(1e3 * _ride_rate(axle) / sprung) / (2.0 * math.pi)
 
