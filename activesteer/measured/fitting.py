@@ -43,9 +43,9 @@ class FitTable:
     differences."""
     start: dict[str, float] = field(default_factory=dict)
     """Start of the search for each factor; by default the value of the files, or the middle of the range."""
-    from_s: float | None = None
+    from_s: float = -math.inf
     """Start of the compared part of the recordings [s]. Inputs are driven from the first row."""
-    until_s: float | None = None
+    until_s: float = math.inf
     """End of the compared part [s]."""
     windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Start and end of the compared part of each recording, instead of `from_s` and `until_s` [s]."""
@@ -103,8 +103,7 @@ def measured_of(
     time_s = recording.time_s
     begin_s = float(time_s[0])
     # The last row of a run is one step before its end.
-    from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
-    begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
+    begin, end = table.windows.get(name, (table.from_s, table.until_s))
     inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
     found = {}
     for channel in channels:
