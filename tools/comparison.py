@@ -31,8 +31,8 @@ from activesteer.errors import ParameterError, SimulationDiverged
 from activesteer.plotting import Heat, Picture, draw
 from activesteer.recording import Recording, check_target
 from activesteer.scenario import FileOrTable, resolve
-from activesteer.studies.engine.workers import in_parallel
-from activesteer.studies.reproduction import Progress, drive
+from activesteer.studies.engine.workers import Progress, in_parallel
+from activesteer.studies.reproduction import drive
 from tools.population_results import NONE, STEERING_EFFORT, TOTAL, UNITS, Population, SystemEffect, asked
 
 if TYPE_CHECKING:

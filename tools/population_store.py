@@ -28,7 +28,7 @@ from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import CLAIM, DISTANCE, drive
 from activesteer.studies.engine.store import RESULTS
 from activesteer.studies.engine.study import study
-from activesteer.studies.engine.study_file import read_study
+from activesteer.studies.engine.study_file import label_of, read_study
 from activesteer.studies.engine.workers import in_parallel
 from tools.make_setting import AROUND
 from tools.population_results import (
@@ -368,7 +368,7 @@ def judge_again(changed: dict[str, str], jobs: int | None) -> Population:
         }
     )
     plan = Plan(population_study(stored.samples, stored.seed))
-    scenarios = [label for label, _ in plan.settings.maneuvers]
+    scenarios = [label_of(item) for item in plan.study.maneuvers]
     firsts = [(scenarios.index(name) * stored.samples + sample) * len(SYSTEMS) for name, sample in wanted]
     tasks = [(plan.settings, plan.requests(range(first, first + len(SYSTEMS)))) for first in firsts]
     driven = dict(zip(wanted, in_parallel(drive, tasks, jobs), strict=True))

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from activesteer.analysis.series import peak
+from activesteer.analysis.series import peak, value_at
 from activesteer.analysis.source import RecordingLike
 from activesteer.core.conventions import CORNERS, GRAVITY_MPS2, Array
 from activesteer.errors import RecordingError
@@ -166,8 +166,7 @@ def brake_in_turn_metrics(recording: RecordingLike) -> dict[str, float]:
     side, radius_m = math.copysign(1.0, yaw_rate_radps), abs(speed_mps / yaw_rate_radps)
     after_s = float(time_s[begin]) + AFTER_S
     speed_then, yaw_rate_then, x_then, y_then = (
-        float(np.interp(after_s, time_s, recording[name])) if after_s <= time_s[-1] else math.nan
-        for name in ("speed_mps", "yaw_rate_radps", "x_m", "y_m")
+        value_at(time_s, recording[name], after_s) for name in ("speed_mps", "yaw_rate_radps", "x_m", "y_m")
     )
     course_rad = float(recording["yaw_rad"][begin] + recording["sideslip_rad"][begin])
     middle_x = float(recording["x_m"][begin]) - side * radius_m * math.sin(course_rad)

@@ -1,7 +1,4 @@
-"""Operations on sampled signals: smoothing, filters, offsets, crossings and step responses.
-
-Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
-"""
+"""Operations on sampled signals: smoothing, filters, crossings and step responses."""
 
 from __future__ import annotations
 
@@ -104,6 +101,11 @@ def crossing_time(time_s: Array, values: Array, level: float) -> float:
     i = int(rising[0])
     fraction = (level - values[i]) / (values[i + 1] - values[i])
     return float(time_s[i] + fraction * (time_s[i + 1] - time_s[i]))
+
+
+def value_at(time_s: Array, values: Array, at_s: float) -> float:
+    """Return the interpolated value at a time, or nan after the end of the run."""
+    return float(np.interp(at_s, time_s, values)) if at_s <= time_s[-1] else math.nan
 
 
 def largest_rate(values: Array, timestep_s: float) -> float:
@@ -216,36 +218,3 @@ def low_pass(values: Array, timestep_s: float, cut_off_Hz: float, poles: int = 1
         )
     sections = butter(poles // 2, cut_off_Hz, fs=1.0 / timestep_s, output="sos")
     return sosfiltfilt(sections, values, padlen=ends)
-
-
-FAST_RADPS: Final = math.radians(75.0)
-"""Rate of the steering wheel at the end of the range [rad/s]."""
-FAST_FOR_S: Final = 0.2
-"""Least duration of this rate [s]."""
-THRESHOLD_RAD: Final = math.radians(5.0)
-"""Steering wheel angle that marks the start of steer when it is first exceeded [rad]. The range ends before it."""
-RANGE_S: Final = 1.0
-"""Length of the range [s]."""
-_AVERAGED_S: Final = 0.1
-"""Window of the moving average of the rate [s]."""
-
-
-def zeroing_range(time_s: Array, steering_rad: Array) -> slice:
-    """Return the samples for zeroing: the last second before the steering wheel turns fast."""
-    step_s = timestep(time_s)
-    width = max(1, round(_AVERAGED_S / step_s))
-    rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
-    fast = np.concatenate(([False], np.abs(rate) > FAST_RADPS, [False])).astype(np.int8)
-    begins, ends = np.flatnonzero(np.diff(fast) > 0), np.flatnonzero(np.diff(fast) < 0)
-    before = np.abs(steering_rad[begins] - steering_rad[0]) < THRESHOLD_RAD
-    long = begins[before & (ends - begins >= FAST_FOR_S / step_s)]
-    if long.size == 0:
-        return slice(0, 0)
-    end = int(long[0])
-    return slice(max(0, end - round(RANGE_S / step_s)), end)
-
-
-def offset(values: Array, samples: slice) -> float:
-    """Return the mean of a signal over some samples, or 0 for no samples."""
-    # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
-    return float(np.mean(values[samples])) if samples.stop > samples.start else 0.0

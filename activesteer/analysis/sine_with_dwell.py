@@ -21,16 +21,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from activesteer.analysis.series import (
-    THRESHOLD_RAD,
-    Array,
-    crossing_time,
-    low_pass,
-    offset,
-    peak,
-    timestep,
-    zeroing_range,
-)
+from activesteer.analysis.series import Array, crossing_time, low_pass, peak, timestep, value_at
 from activesteer.analysis.source import RecordingLike, entry
 from activesteer.errors import RecordingError
 from activesteer.recording.contents import events_of
@@ -52,6 +43,18 @@ car up to 3500 kg, from 5 A on."""
 RATIO_LIMITS: Final = (0.35, 0.20)
 """Largest allowed ratios at `INSTANTS_S`."""
 
+_FAST_RADPS: Final = math.radians(75.0)
+"""Rate of the steering wheel at the end of the range for zeroing [rad/s]."""
+_FAST_FOR_S: Final = 0.2
+"""Least duration of this rate [s]."""
+_THRESHOLD_RAD: Final = math.radians(5.0)
+"""Steering wheel angle that marks the start of steer when it is first exceeded [rad]. The range for zeroing ends
+before it."""
+_RANGE_S: Final = 1.0
+"""Length of the range for zeroing [s]."""
+_AVERAGED_S: Final = 0.1
+"""Window of the moving average of the rate [s]."""
+
 PEAKS: Final = ("yaw_rate_radps", "ay_mps2", "sideslip_rad", "roll_rad", "steering_wheel_rad")
 """Channels whose largest magnitude is a metric."""
 
@@ -70,22 +73,22 @@ def steering(recording: RecordingLike) -> Steering:
     """Return start, reversal and completion of a sine with dwell, interpolated between samples."""
     time_s = recording.time_s
     angle = low_pass(recording["steering_wheel_rad"], timestep(time_s), STEERING_CUT_OFF_Hz)
-    if abs(angle[0]) > THRESHOLD_RAD:  # more than the offset of a sensor
+    if abs(angle[0]) > _THRESHOLD_RAD:  # more than the offset of a sensor
         problem = "the sine with dwell has no start: the steering wheel is already turned in the first sample"
         raise RecordingError(problem, value=float(angle[0]))
-    straight = zeroing_range(time_s, angle)
-    angle -= offset(recording["steering_wheel_rad"], straight)
-    turned = np.flatnonzero(np.abs(angle) > THRESHOLD_RAD)
+    straight = _zeroing_range(time_s, angle)
+    angle -= _offset(recording["steering_wheel_rad"], straight)
+    turned = np.flatnonzero(np.abs(angle) > _THRESHOLD_RAD)
     if turned.size == 0:
         raise RecordingError(
             f"the recording holds no sine with dwell: the steering wheel turns by "
             f"{math.degrees(float(np.abs(angle).max())):.3g} deg at most; more than "
-            f"{math.degrees(THRESHOLD_RAD):.3g} deg are needed",
+            f"{math.degrees(_THRESHOLD_RAD):.3g} deg are needed",
             value=float(np.abs(angle).max()),
         )
     side = math.copysign(1.0, angle[turned[0]])
-    begin_s = crossing_time(time_s, side * angle, THRESHOLD_RAD)
-    other = np.flatnonzero(-side * angle > THRESHOLD_RAD)
+    begin_s = crossing_time(time_s, side * angle, _THRESHOLD_RAD)
+    other = np.flatnonzero(-side * angle > _THRESHOLD_RAD)
     if other.size == 0:
         raise RecordingError(
             "the recording holds no sine with dwell: the steering wheel turns to one side only",
@@ -134,7 +137,7 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
     times = steering(recording)
     time_s = recording.time_s
     yaw_rate, ay = (
-        low_pass(recording[name], timestep(time_s), MOTION_CUT_OFF_Hz) - offset(recording[name], times.straight)
+        low_pass(recording[name], timestep(time_s), MOTION_CUT_OFF_Hz) - _offset(recording[name], times.straight)
         for name in ("yaw_rate_radps", "ay_mps2")
     )
     top_s, top = _first_peak(time_s, -times.side * yaw_rate, times.reversal_s)
@@ -146,7 +149,7 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
         "yaw_rate_reversal_peak_time_s": top_s,
     }
     for instant_s in INSTANTS_S:
-        later = -times.side * _at(time_s, yaw_rate, times.completion_s + instant_s)
+        later = -times.side * value_at(time_s, yaw_rate, times.completion_s + instant_s)
         values[f"yaw_rate_after_{1000.0 * instant_s:.0f}ms_share"] = later / top
     values["lateral_displacement_m"] = _displacement(recording, times)
     values["lateral_displacement_by_ay_m"] = times.side * integrated_displacement(time_s, ay, times.begin_s)
@@ -155,6 +158,30 @@ def sine_with_dwell_metrics(recording: RecordingLike) -> dict[str, float]:
     values["speed_end_mps"] = float(recording["speed_mps"][-1])
     values["heading_end_rad"] = float(recording["yaw_rad"][-1] - recording["yaw_rad"][0])
     return values
+
+
+def _zeroing_range(time_s: Array, steering_rad: Array) -> slice:
+    """Return the samples for zeroing: the last second before the steering wheel turns fast.
+
+    Source: 49 CFR 571.126 (FMVSS 126), S7.11.4 and S7.11.5; UN Regulation 140, 9.11.
+    """
+    step_s = timestep(time_s)
+    width = max(1, round(_AVERAGED_S / step_s))
+    rate = np.convolve(np.gradient(steering_rad, step_s), np.full(width, 1.0 / width), mode="same")
+    fast = np.concatenate(([False], np.abs(rate) > _FAST_RADPS, [False])).astype(np.int8)
+    begins, ends = np.flatnonzero(np.diff(fast) > 0), np.flatnonzero(np.diff(fast) < 0)
+    before = np.abs(steering_rad[begins] - steering_rad[0]) < _THRESHOLD_RAD
+    long = begins[before & (ends - begins >= _FAST_FOR_S / step_s)]
+    if long.size == 0:
+        return slice(0, 0)
+    end = int(long[0])
+    return slice(max(0, end - round(_RANGE_S / step_s)), end)
+
+
+def _offset(values: Array, samples: slice) -> float:
+    """Return the mean of a signal over some samples, or 0 for no samples."""
+    # The signal must be unfiltered: a filter without phase rings before the steering wheel turns.
+    return float(np.mean(values[samples])) if samples.stop > samples.start else 0.0
 
 
 def _crossing_before(time_s: Array, values: Array, index: int) -> float:
@@ -168,7 +195,7 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
     """Return the time when the steering wheel is back at the centre after the second half-wave, here positive."""
     # With an elastic steering system the wheel may creep over the last degrees or stop short of the centre. The line
     # through 10 and 5 deg is then extrapolated to the centre, so that creep does not delay the completion.
-    below = np.flatnonzero(angle[start:] < THRESHOLD_RAD)
+    below = np.flatnonzero(angle[start:] < _THRESHOLD_RAD)
     if below.size == 0:
         raise RecordingError(
             f"the sine with dwell is not completed: the steering wheel is still at "
@@ -176,17 +203,17 @@ def _completion(time_s: Array, angle: Array, start: int) -> float:
             value=abs(float(angle[-1])),
         )
     end = start + int(below[0])
-    near_s = crossing_time(time_s[start:], -angle[start:], -THRESHOLD_RAD)
+    near_s = crossing_time(time_s[start:], -angle[start:], -_THRESHOLD_RAD)
     centre_s = crossing_time(time_s[end - 1 :], -angle[end - 1 :], 0.0)
     if centre_s - near_s <= LONGEST_CREEP_S:
         return centre_s
-    above = start + np.flatnonzero(angle[start : end + 1] > 2.0 * THRESHOLD_RAD)
+    above = start + np.flatnonzero(angle[start : end + 1] > 2.0 * _THRESHOLD_RAD)
     if above.size == 0:
         raise RecordingError(
-            f"the second half of the sine with dwell stays below {math.degrees(2.0 * THRESHOLD_RAD):.3g} deg: "
+            f"the second half of the sine with dwell stays below {math.degrees(2.0 * _THRESHOLD_RAD):.3g} deg: "
             "its completion cannot be determined"
         )
-    return near_s + (near_s - crossing_time(time_s[above[-1] :], -angle[above[-1] :], -2.0 * THRESHOLD_RAD))
+    return near_s + (near_s - crossing_time(time_s[above[-1] :], -angle[above[-1] :], -2.0 * _THRESHOLD_RAD))
 
 
 def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, float]:
@@ -204,8 +231,8 @@ def _first_peak(time_s: Array, values: Array, begin_s: float) -> tuple[float, fl
 
 def _displacement(recording: RecordingLike, times: Steering) -> float:
     time_s = recording.time_s
-    x0, y0, yaw = (_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
-    x1, y1 = (_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
+    x0, y0, yaw = (value_at(time_s, recording[name], times.begin_s) for name in ("x_m", "y_m", "yaw_rad"))
+    x1, y1 = (value_at(time_s, recording[name], times.begin_s + DISPLACEMENT_TIME_S) for name in ("x_m", "y_m"))
     return times.side * ((y1 - y0) * math.cos(yaw) - (x1 - x0) * math.sin(yaw))
 
 
@@ -217,8 +244,3 @@ def integrated_displacement(time_s: Array, ay_mps2: Array, begin_s: float) -> fl
     # Each acceleration is weighted with the remaining time: one integral replaces two.
     instants_s = np.linspace(begin_s, end_s, 1 + round(DISPLACEMENT_TIME_S / timestep(time_s)))
     return float(np.trapezoid((end_s - instants_s) * np.interp(instants_s, time_s, ay_mps2), instants_s))
-
-
-def _at(time_s: Array, values: Array, instant_s: float) -> float:
-    """Return the interpolated value at a time, or nan after the end of the run."""
-    return float(np.interp(instant_s, time_s, values)) if instant_s <= time_s[-1] else math.nan

@@ -122,8 +122,7 @@ def _tyre(options: argparse.Namespace) -> None:
     arguments.JSON,
 )  # fmt: skip
 def _kc(options: argparse.Namespace) -> None:
-    from activesteer.rigs import kinematics_compliance
-    from activesteer.rigs.kc import draw
+    from activesteer.rigs.kc import draw, kinematics_compliance
 
     result = kinematics_compliance(options.vehicle, arguments.overrides_of(options))
     lines = [result.table()]

@@ -397,7 +397,8 @@ def _driver_loop(options: argparse.Namespace) -> None:
 
 
 def _controller_loop(options: argparse.Namespace) -> None:
-    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins, worst_margins, write_margins_page
+    from activesteer.pages import write_page
+    from activesteer.studies.linear.margins import SPEEDS_KMH, loop_margins, margins_page, worst_margins
 
     speeds_kmh, overrides = options.speeds_kmh or SPEEDS_KMH, arguments.overrides_of(options)
     loops = options.controller or ("ars", "afs"), options.vehicle, speeds_kmh, overrides
@@ -413,8 +414,11 @@ def _controller_loop(options: argparse.Namespace) -> None:
     lines = [*terminal.table_lines(rows, _CONTROLLER_COLUMNS)]
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
-        changed = ", ".join(f"{key} = {value:.3g}" for key, value in least["factors"].items())
+        shown = {key: value if isinstance(value, str) else f"{value:.3g}" for key, value in least["factors"].items()}
+        changed = ", ".join(f"{key} = {value}" for key, value in shown.items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
         lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
-    pages = [] if options.output is None else [write_margins_page(found, str(options.vehicle), options.output)]
+    pages = []
+    if options.output is not None:
+        pages = [write_page(margins_page(found, str(options.vehicle)), options.output / "margins.html")]
     terminal.tell(options, rows, lines, pages, "page")

@@ -24,8 +24,6 @@ from activesteer.recording import Recording
 INPUTS: Final = ("steering_wheel_rad", "rack_m")
 """Channels that align the clocks if both runs have them: another car's response may lag, but not its input."""
 RESPONSES: Final = ("yaw_rate_radps", "ay_mps2", "roll_rad", "sideslip_rad")
-_SEEN: Final = 1e-3
-"""Noise relative to the tolerance below which a table leaves the noise out."""
 _STEP_S: Final = 0.01
 """Step of the search [s]. The result is found between its sample times."""
 _NEARLY: Final = 0.01
@@ -350,21 +348,6 @@ def _crossed(
     within = distance[np.arange(len(x)), nearest] <= 1.0
     beside, width = py[nearest], width_y[nearest]
     return Compared(name, tolerance, x, y, confidence[rows], beside, beside - width, beside + width, within, noise)
-
-
-def words(found: Compared) -> tuple[str, str, str, str, str]:
-    """Return the cells of a channel: name, rms of the residual, tolerance, proportion inside, verdict."""
-    shown = quantity_of(found.channel)
-    unit, factor = shown.unit.name, shown.factor
-    allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
-    allowed += f" + noise {found.noise * factor:.2g}" if found.noise > _SEEN * found.tolerance.offset else ""
-    return (
-        shown.label,
-        f"{rms(found.residual) * factor:.3g} {unit}",
-        allowed,
-        f"{100.0 * found.share_inside:.1f} %",
-        "inside" if found.inside else "outside",
-    )
 
 
 def assumptions(found: Comparison) -> list[str]:

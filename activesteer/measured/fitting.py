@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from activesteer.analysis.series import rms
 from activesteer.config import Range, build, field_in_unit
 from activesteer.core.conventions import Array
 from activesteer.driver import is_driver_file
@@ -27,9 +29,9 @@ from activesteer.simulation.runner import run_scenario
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
-from activesteer.studies.engine.runs import Settings, prepare, scenario_of
+from activesteer.studies.engine.runs import Settings, prepare
 from activesteer.studies.engine.study_file import StudyFile, read_study
-from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
+from activesteer.studies.engine.workers import Workers, in_parallel, workers_for
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class FitTable:
     differences."""
     start: dict[str, float] = field(default_factory=dict)
     """Start of the search for each factor; by default the value of the files, or the middle of the range."""
-    from_s: float | None = None
+    from_s: float = -math.inf
     """Start of the compared part of the recordings [s]. Inputs are driven from the first row."""
-    until_s: float | None = None
+    until_s: float = math.inf
     """End of the compared part [s]."""
     windows: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Start and end of the compared part of each recording, instead of `from_s` and `until_s` [s]."""
@@ -101,8 +103,7 @@ def measured_of(
     time_s = recording.time_s
     begin_s = float(time_s[0])
     # The last row of a run is one step before its end.
-    from_s, until_s = table.windows.get(name, (table.from_s, table.until_s))
-    begin, end = -math.inf if from_s is None else from_s, math.inf if until_s is None else until_s
+    begin, end = table.windows.get(name, (table.from_s, table.until_s))
     inside = (time_s >= begin) & (time_s <= min(end, time_s[-1] - study.timestep_s))
     found = {}
     for channel in channels:
@@ -221,7 +222,7 @@ def fit(
     problem = _Problem(*read_fit(study_file))
     with workers_for(jobs, scheduler=scheduler) as workers:
         prepare(workers, problem.settings)
-        found = search(problem.answers_by(workers, progress), problem.start, problem.check)
+        found = search(partial(problem.answers, workers, progress), problem.start, problem.check)
     return problem.result(found)
 
 
@@ -254,38 +255,31 @@ class _Problem:
         self.settings: Settings = self._plan.settings
         start = np.array([_start(factor, table, first, study) for factor in study.factors])
         self.start = (start - self._low) / (self._high - self._low)
-        self.runs = 0
+        self.runs, self._rounds, self._best = 0, 0, math.nan
 
     def _factor_values(self, place: Array) -> dict[str, Any]:
         values = self._low + (self._high - self._low) * place
         return dict(zip(self._study.keys, values.tolist(), strict=True))
 
-    def answers_by(self, workers: Workers, progress: FitProgress) -> Callable[[list[Array]], list[Answer]]:
-        """Return a function that repeats every recording with each of several sets of parameters, on the workers."""
-        rounds, best = 0, math.nan
+    def answers(self, workers: Workers, progress: FitProgress, places: list[Array]) -> list[Answer]:
+        """Repeat every recording with each of several sets of parameters, on the workers."""
+        self._rounds += 1
+        calls, count = [], len(self._measured)
+        for place in places:
+            for recording, measured in enumerate(self._measured):
+                overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
+                times = {name: time_s for name, (time_s, _) in measured.channels.items()}
+                calls.append((self.settings, recording, overrides, times))
 
-        def answers(places: list[Array]) -> list[Answer]:
-            nonlocal rounds, best
-            rounds += 1
-            queue = TaskQueue(workers)
-            for number, place in enumerate(places):
-                for recording, measured in enumerate(self._measured):
-                    overrides = self._plan.request_with(0, 0, (recording, 0, 0), self._factor_values(place)).overrides
-                    times = {name: time_s for name, (time_s, _) in measured.channels.items()}
-                    queue.add((number, recording), drive, self.settings, recording, overrides, times)
-            driven: dict[tuple[int, int], dict[str, Array] | str] = {}
-            total = len(places) * len(self._measured)
-            for outcome in queue.outcomes():
-                driven[outcome.key] = outcome.result()
-                self.runs += 1
-                progress(rounds, len(driven), total, best)
-            found = [self._answer([driven[number, each] for each in range(len(self._measured))])
-                     for number in range(len(places))]  # fmt: skip
-            if not isinstance(found[0], str):
-                best = np.fmin(best, _misfit(found[0]))
-            return found
+        def report(_: int, done: int) -> None:
+            self.runs += 1
+            progress(self._rounds, done, len(calls), self._best)
 
-        return answers
+        driven = in_parallel(drive, calls, report=report, workers=workers)
+        found = [self._answer(driven[first : first + count]) for first in range(0, len(driven), count)]
+        if not isinstance(found[0], str):
+            self._best = np.fmin(self._best, rms(np.concatenate(found[0])))
+        return found
 
     def _answer(self, driven: Sequence[dict[str, Array] | str]) -> Answer:
         series = []
@@ -337,7 +331,7 @@ class _Problem:
         everywhere = {factor.key for factor in self._study.factors if not factor.maneuvers}
         overrides = [factors.overrides(number, 0, values) for number in range(len(self._measured))]
         return Fit(
-            parameters, correlations, compared, self._table.intervals, freedom, _misfit(found.after),
+            parameters, correlations, compared, self._table.intervals, freedom, rms(np.concatenate(found.after)),
             found.rounds, self.runs, found.settled,
             {key: value for key, value in overrides[0].items() if key in everywhere},
             {measured.name: own for measured, each in zip(self._measured, overrides, strict=True)
@@ -350,8 +344,8 @@ def drive(
 ) -> dict[str, Array] | str:
     """Drive once, and return the compared channels, or the reason for a failure."""
     try:
-        scenario = scenario_of(settings, recording, 0, overrides)
-        run = run_scenario(scenario, settings.controllers[0][1], timestep_s=settings.study.timestep_s)
+        scenario = settings.study.scenario(recording, 0, overrides)
+        run = run_scenario(scenario, settings.study.controllers[0], timestep_s=settings.study.timestep_s)
     except ActiveSteerError as error:
         return str(error)
     run = at_sensor(run)
@@ -369,7 +363,3 @@ def _start(factor: Factor, table: FitTable, scenario: Any, study: StudyFile) -> 
     if isinstance(here, (int, float)) and not isinstance(here, bool) and factor.low <= here <= factor.high:
         return float(here)
     return 0.5 * (factor.low + factor.high)
-
-
-def _misfit(series: Sequence[Array]) -> float:
-    return math.sqrt(float(np.mean(np.concatenate(series) ** 2)))

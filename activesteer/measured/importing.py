@@ -62,9 +62,9 @@ class MeasurementMap:
     """Step of the recording; by default the step of the file."""
     max_gap_s: Annotated[float, Range(0.0)] = 0.1
     """Longest gap without samples that is bridged by a straight line."""
-    start_s: float | None = None
+    start_s: float = -math.inf
     """Start of the imported part, in the time of the file."""
-    end_s: float | None = None
+    end_s: float = math.inf
     """End of the imported part."""
     title: str = ""
     """Title for lists and plots."""
@@ -269,9 +269,7 @@ def _signal(name: str, source: _Source, time_s: Array, values: Array, chosen: Me
         )  # fmt: skip
     shift_s = chosen.shift_s.get(path.name, 0.0)
     time_s, values = signals.samples(column.name, time_s + shift_s, values, path.name)
-    start_s = -math.inf if chosen.start_s is None else chosen.start_s
-    end_s = math.inf if chosen.end_s is None else chosen.end_s
-    inside = (time_s >= start_s) & (time_s <= end_s)
+    inside = (time_s >= chosen.start_s) & (time_s <= chosen.end_s)
     if np.count_nonzero(inside) < 2:
         raise RecordingError(f"{column.name} has no samples between start_s and end_s", file=path.name)
     time_s, values = time_s[inside], values[inside]

@@ -18,7 +18,7 @@ from activesteer.core.files import json_text, make_folder, write_text
 from activesteer.core.units import parameter_title, quantity_of, typeset
 from activesteer.errors import StudyError
 from activesteer.measured.circle import CircleValidation
-from activesteer.measured.comparison import STANDARDS, Compared, Comparison, Tolerance, assumptions, words
+from activesteer.measured.comparison import STANDARDS, Compared, Comparison, Tolerance, assumptions
 from activesteer.measured.fit_result import Compared as FitCompared
 from activesteer.measured.fit_result import Fit, rests_on
 from activesteer.measured.folder import MeasuredValidation, Part
@@ -30,6 +30,8 @@ _EDGE: Final = "#9bbbd4"
 _START: Final = "#888888"
 _WIDE: Final = 3.2
 """Width of a simulated curve, at which a measured curve that coincides with it remains visible [pt]."""
+_SEEN: Final = 1e-3
+"""Noise relative to the tolerance below which a table leaves the noise out."""
 _SAME_TIME_S: Final = 0.05e-3
 """Shift below which a table shows 0.0 ms [s]."""
 
@@ -50,9 +52,18 @@ def comparison_page(found: Comparison, measured: list[str], simulated: str) -> P
 
 
 def _cells(found: Compared) -> tuple[Text, ...]:
-    """Return the cells of a comparison, with the verdict last."""
-    *cells, verdict = words(found)
-    return (*cells, (passed if found.inside else failed)(verdict, chip=True))
+    """Return the cells of a channel: name, rms of the residual, tolerance, share inside, verdict."""
+    shown = quantity_of(found.channel)
+    unit, factor = shown.unit.name, shown.factor
+    allowed = f"{found.tolerance.offset * factor:.3g} {unit} + {100.0 * found.tolerance.gain:g} %"
+    allowed += f" + noise {found.noise * factor:.2g}" if found.noise > _SEEN * found.tolerance.offset else ""
+    return (
+        shown.label,
+        f"{rms(found.residual) * factor:.3g} {unit}",
+        allowed,
+        f"{100.0 * found.share_inside:.1f} %",
+        passed("inside", chip=True) if found.inside else failed("outside", chip=True),
+    )
 
 
 def _shift(shift_s: float) -> str:

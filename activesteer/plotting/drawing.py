@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -96,14 +96,13 @@ def draw(picture: Picture) -> Figure:
     return figure
 
 
-def save_all(pictures: Mapping[str, Callable[[], Picture]], folder: str | os.PathLike[str], title: str) -> list[Path]:
+def save_all(pictures: Mapping[str, Picture], folder: str | os.PathLike[str], title: str) -> list[Path]:
     """Draw figures and write them as PNG files."""
     directory = make_folder(folder, ParameterError)
-    paths = []
-    for name, make in pictures.items():
-        picture = make()
-        paths.append(save(draw(picture._replace(title=f"{title}{picture.title}")), directory / f"{name}.png"))
-    return paths
+    return [
+        save(draw(picture._replace(title=f"{title}{picture.title}")), directory / f"{name}.png")
+        for name, picture in pictures.items()
+    ]
 
 
 def _fill(axis: Axes, panel: Panel) -> None:

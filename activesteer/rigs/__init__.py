@@ -3,7 +3,3 @@
 In: a car, and the motion or force that the rig imposes.
 Out: forces, displacements and their slopes.
 """
-
-from activesteer.rigs.kc import KcResult, kinematics_compliance
-
-__all__ = ["KcResult", "kinematics_compliance"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -82,7 +83,7 @@ def examine(
     output: str | os.PathLike[str] | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[str, str, int, int], None] | None = None,
+    progress: Callable[[str, str, int, int], None] = lambda *_: None,
 ) -> Examination:
     """Drive and evaluate a standard, one of `catalogue.STANDARDS`, with each controller separately.
 
@@ -100,17 +101,13 @@ def examine(
         for controller in controllers:
             label = label_of(controller)
             folder = None if output is None else Path(output) / "runs" / file_word(label)
-
-            def tell(series: str, done: int, total: int, label: str = label) -> None:
-                if progress is not None:
-                    progress(label, series, done, total)
-
+            tell = functools.partial(progress, label)
             read = read_by(given, controller)
             runner = StandardRunner(standard.name, vehicle, driver, controller, read, folder, workers, tell)
             try:
                 found[label] = EXAMINED_BY[standard.name](runner)
             except NoResult as reason:
-                found[label] = Findings.without_result(reason)
+                found[label] = Findings({"error": str(reason)}, f"no result: {reason}")
     today = datetime.datetime.now(tz=datetime.UTC).date()
     return Examination(standard, label_of(vehicle), label_of(driver), given, found, versions(), today)
 
@@ -193,7 +190,7 @@ def _side_by_side(findings: Mapping[str, Findings]) -> dict[str, Table]:
 
 
 def _together(findings: Mapping[str, Findings]) -> dict[str, Picture]:
-    """Return overlaid plots of several controllers by title, one colour each, or None for a single controller."""
+    """Return overlaid plots of several controllers by title, one colour each; empty for a single controller."""
     looks = run_looks(findings)
     shown = {name: {picture.title: picture for picture in found.pictures} for name, found in findings.items()}
     shown = {name: pictures for name, pictures in shown.items() if pictures}
@@ -227,14 +224,11 @@ def _overlays(parts: Sequence[Panel | Heat]) -> bool:
 
 
 def _in_one_colour(panel: Panel, name: str, colour: str) -> Iterator[Curve]:
-    looks = ((colour, _LINE),) if len(panel.curves) == 1 else ((_pale(colour), _WIDE), (colour, _THIN))
+    pale = "#" + "".join(f"{round(255 * _PALE + (1.0 - _PALE) * part):02x}" for part in bytes_of(colour))
+    looks = ((colour, _LINE),) if len(panel.curves) == 1 else ((pale, _WIDE), (colour, _THIN))
     for curve, (own, width) in zip(panel.curves, looks, strict=False):
         label = f"{name}, {curve.label}" if curve.label else name
         yield curve._replace(label=label, colour=own, dashes=curve.dashes and "-", width=width)
-
-
-def _pale(colour: str) -> str:
-    return "#" + "".join(f"{round(255 * _PALE + (1.0 - _PALE) * part):02x}" for part in bytes_of(colour))
 
 
 def _verdict(found: Findings) -> Markup:

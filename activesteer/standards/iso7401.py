@@ -17,7 +17,7 @@ from activesteer.analysis.frequency_response import (
     random_response,
 )
 from activesteer.core.conventions import Array
-from activesteer.core.units import DisplayUnit, display_unit
+from activesteer.core.units import DisplayUnit, display_unit, quantity_of
 from activesteer.errors import RecordingError
 from activesteer.pages import Table
 from activesteer.plotting import Curve, Panel, Picture
@@ -43,7 +43,6 @@ _RESPONSES: Final = {
     "roll_rad": DisplayUnit("deg/deg", 1.0),
 }
 """Outputs and the units of their gains over steering wheel angle."""
-_NAMES: Final = {"yaw_rate_radps": "yaw rate", "ay_mps2": "lateral acceleration", "roll_rad": "roll angle"}
 _POINTS: Final = 60
 SEQUENCES: Final = 12
 """Number of one-minute runs with random steering. The standard requires 12 minutes."""
@@ -87,7 +86,7 @@ def examine(runner: StandardRunner) -> Findings:
         f"TB factor {math.degrees(left.metric('tb_srad')):.2f} s deg; yaw rate bandwidth "
         + (f"above {HIGHEST_Hz:g} Hz" if math.isnan(bandwidth_Hz) else f"{bandwidth_Hz:.2f} Hz")
         + "".join(
-            f"; coherence below {COHERENCE:g}: {_NAMES[name]}, {kind}, {words}"
+            f"; coherence below {COHERENCE:g}: {quantity_of(name).label}, {kind}, {words}"
             for (kind, name), words in weak.items()
             if words
         )
@@ -114,9 +113,10 @@ def examine(runner: StandardRunner) -> Findings:
         metrics_table("Sine sweep", {"sweep": sweep.metrics}),
         _coherence_table(found, weak),
     ]
+    driven_of = {kind: responses for kind, responses in found.items() if responses}
     pictures = [
         Picture("Step", time_panels(steps, _STEP_CHANNELS, _BEGIN_S, "the start of steering")),
-        *(_bode(name, {kind: responses[name] for kind, responses in found.items() if responses}) for name in _NAMES),
+        *(_bode(name, {kind: responses[name] for kind, responses in driven_of.items()}) for name in _RESPONSES),
     ]
     return Findings(values, summary, tables, pictures)
 
@@ -162,7 +162,8 @@ def _coherence_table(found: dict[str, Responses], weak: dict[tuple[str, str], st
         for name, each in responses.items():
             least = int(each.coherence.argmin())
             words = weak[kind, name] or "nowhere"
-            rows.append((_NAMES[name], kind, f"{each.coherence[least]:.4f}", f"{each.frequency_Hz[least]:.2f}", words))
+            numbers = f"{each.coherence[least]:.4f}", f"{each.frequency_Hz[least]:.2f}"
+            rows.append((quantity_of(name).label, kind, *numbers, words))
     columns = ("output", "steering", "least coherence", "at [Hz]", f"below {COHERENCE:g}")
     return Table(
         "Coherence", columns, rows, frozenset(number for number, row in enumerate(rows) if row[-1] != "nowhere")
@@ -183,4 +184,4 @@ def _bode(name: str, found: Responses) -> Picture:
         panel("phase [deg]", lambda each: np.degrees(np.unwrap(np.angle(each.response)))),
         panel("coherence [-]", lambda each: each.coherence, [(COHERENCE, f"bound {COHERENCE:g}")]),
     ]
-    return Picture(f"{_NAMES[name][0].upper()}{_NAMES[name][1:]} over steering wheel angle", panels)
+    return Picture(f"{quantity_of(name).label.capitalize()} over steering wheel angle", panels)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from activesteer.analysis.series import value_at
 from activesteer.config import Range
 from activesteer.core.conventions import CURVE_STEP_S, Array
 from activesteer.core.metric_table import metric
@@ -20,7 +21,7 @@ from activesteer.plotting import Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.studies.engine.runs import CURVE, Status
 from activesteer.studies.engine.study import study
-from activesteer.studies.engine.workers import Workers
+from activesteer.studies.engine.workers import Progress, Workers
 
 _LEAD_S: Final = 0.2
 """Time by which a curve begins before time zero [s]."""
@@ -60,7 +61,7 @@ class StandardRun:
     def at(self, channel: str, time_s: float) -> float:
         """Return the interpolated value of a channel at a time, or nan after the end of the run."""
         values = self.channels.get(channel, np.empty(0))
-        return float(np.interp(time_s, self.time_s, values)) if len(values) and time_s <= self.time_s[-1] else math.nan
+        return value_at(self.time_s, values, time_s) if len(values) else math.nan
 
     @property
     def values(self) -> dict[str, Any]:
@@ -90,7 +91,7 @@ class StandardRunner:
     overrides: Mapping[str, Any]  # overrides of the car: dotted key -> value
     folder: Path | None  # folder for the studies, which can be resumed; None if they are not kept
     workers: Workers  # processes that make the runs
-    progress: Callable[[str, int, int], None]  # called with the series, number of finished runs, and number of all runs
+    progress: Progress  # called with the series, number of finished runs, and number of all runs
 
     def scenario(self, maneuver: FileOrTable, overrides: Mapping[str, Any] | None = None) -> Scenario:
         """Resolve a manoeuvre with the car of the runner."""
@@ -144,13 +145,8 @@ class Findings:
 
     values: dict[str, Any]  # values that `--json` prints, with `pass` if the standard has limits
     summary: str  # verdict or findings in a sentence
-    tables: Sequence[Table] = field(default_factory=tuple)
-    pictures: Sequence[Picture] = field(default_factory=tuple)
-
-    @classmethod
-    def without_result(cls, reason: NoResult) -> Findings:
-        """Return the findings of a car that cannot be tested."""
-        return cls({"error": str(reason)}, f"no result: {reason}")
+    tables: Sequence[Table] = ()
+    pictures: Sequence[Picture] = ()
 
     @property
     def error(self) -> str:

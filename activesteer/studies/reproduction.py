@@ -7,7 +7,7 @@ made from the files.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,17 +24,13 @@ from activesteer.core.files import make_folder
 from activesteer.errors import ActiveSteerError, ParameterError, RecordingError
 from activesteer.plotting import save
 from activesteer.recording import Recording, check_target
-from activesteer.rigs import kinematics_compliance
-from activesteer.rigs.kc import rear_camber_figure
+from activesteer.rigs.kc import kinematics_compliance, rear_camber_figure
 from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.workers import TaskQueue, workers_for
+from activesteer.studies.engine.workers import Progress, TaskQueue, workers_for
 from activesteer.studies.linear.identification import single_track_response
 from activesteer.studies.linear.linearisation import linear_response, linearise
-
-Progress = Callable[[str, int, int], None]
-"""Callback with the finished run, the number of finished runs, and the total."""
 
 
 @dataclass
@@ -65,11 +61,10 @@ class Reproduction:
 def reproduce(
     folder: str | os.PathLike[str],
     vehicle: FileOrTable = "compact",
-    overrides: Mapping[str, Any] | None = None,
     *,
     setting: str = LITERATURE,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> Reproduction:
     """Drive all five scenarios with all three systems and check the paper's claims.
 
@@ -82,7 +77,7 @@ def reproduce(
             f"is a setting of the {VEHICLE}; leave out --vehicle", key=f"--setting {PAPER}", value=vehicle
         )
     numbers = read_setting(setting)
-    scenarios = {name: resolve(name, vehicle, {**numbers.overrides(name), **(overrides or {})}) for name in SCENARIOS}
+    scenarios = {name: resolve(name, vehicle, numbers.overrides(name)) for name in SCENARIOS}
     target = make_folder(folder, ParameterError)
     paths = {name: {system: target / f"{name}-{system}.mcap" for system in SYSTEMS} for name in scenarios}
     result = Reproduction(paths, setting=setting)
@@ -93,8 +88,7 @@ def reproduce(
     for done, (name, system, problem) in enumerate(drive(scenarios, result.paths, jobs), 1):
         if problem:
             result.failures[name, system] = problem
-        if progress is not None:
-            progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
+        progress(f"{name} {system}" + (" FAILED" if problem else ""), done, total)
     claims = [claim for name, runs in result.recordings().items() for claim in SCENARIOS[name](runs)]
     result.scorecard = scorecard(claims, next(iter(scenarios.values())).car.name, setting=setting)
     return result

@@ -6,7 +6,6 @@ import math
 import os
 import timeit
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -173,14 +172,14 @@ def draw(params: TyreParameters, folder: str | os.PathLike[str]) -> list[Path]:
     """Draw forces and relaxation lengths as PNG files, at the file's pressure and speed and within its ranges."""
     formula = MagicFormula(params)
     name = params.source.name if params.source else "tyre"
-    pictures: dict[str, Callable[[MagicFormula], Picture]] = {
-        "side_force": _side_force,
-        "longitudinal_force": _longitudinal_force,
-        "friction_ellipse": _friction_ellipse,
-        "combined_slip": _combined_slip,
-        "relaxation_lengths": _relaxation_lengths,
+    pictures = {
+        "side_force": _side_force(formula),
+        "longitudinal_force": _longitudinal_force(formula),
+        "friction_ellipse": _friction_ellipse(formula),
+        "combined_slip": _combined_slip(formula),
+        "relaxation_lengths": _relaxation_lengths(formula),
     }
-    return save_all({file: partial(make, formula) for file, make in pictures.items()}, folder, f"{name}: ")
+    return save_all(pictures, folder, f"{name}: ")
 
 
 def _curve(x: ArrayLike, y: ArrayLike, colour: str, label: str = "", dashes: str = "-", width: float = 1.5) -> Curve:

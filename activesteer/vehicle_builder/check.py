@@ -192,7 +192,7 @@ def _riding(result: KcResult) -> Iterator[Finding]:
     yield from _metrics(result, "kinematics")
     yield _sign(result)
     yield from _metrics(result, "steering")
-    known = result.measured.parameters.steering.ratio
+    known = result.measured.vehicle.parameters.steering.ratio
     yield judged("ratio_error", 100.0 * (known / result["front", "steering_ratio"] - 1.0))
 
 

@@ -9,9 +9,9 @@ import shutil
 
 import pytest
 
-from activesteer import rigs
 from activesteer.commands.cli import main
 from activesteer.plotting import drawing
+from activesteer.rigs import kc
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -19,8 +19,8 @@ def measured_once():
     """Measure the compact once for all tests of the command."""
     with pytest.MonkeyPatch.context() as patch:
         once = functools.cache(lambda vehicle: rigs_measure(vehicle, {}))
-        rigs_measure = rigs.kinematics_compliance
-        patch.setattr(rigs, "kinematics_compliance", lambda vehicle, overrides: once(vehicle))
+        rigs_measure = kc.kinematics_compliance
+        patch.setattr(kc, "kinematics_compliance", lambda vehicle, overrides: once(vehicle))
         yield
 
 

@@ -286,7 +286,7 @@ def test_longitudinal_force_lifts_by_the_slope_of_the_patchs_path(corner: str) -
 
 def test_anti_dive_and_anti_lift_are_those_of_rigid_links() -> None:
     result = on_the_bench()
-    brakes = result.measured.parameters.brakes
+    brakes = result.measured.vehicle.parameters.brakes
     share = brakes.front_torque_Nm / (brakes.front_torque_Nm + brakes.rear_torque_Nm)
     lever = result["car", "wheelbase"] / result["car", "cg_height"]
     assert result["front", "anti_dive"] == pytest.approx(100.0 * share * lever * support("fl"), abs=0.5)

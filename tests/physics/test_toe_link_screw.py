@@ -12,7 +12,7 @@ import activesteer
 from activesteer import ActuatorCommand, Recording
 from activesteer.config.faults import fault_table
 from activesteer.errors import ParameterError
-from activesteer.rigs import kinematics_compliance
+from activesteer.rigs.kc import kinematics_compliance
 from activesteer.rigs.kc.held_car import Case, HeldCar
 from activesteer.rigs.kc.programme import run
 from activesteer.scenario import load_car

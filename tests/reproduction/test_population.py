@@ -17,6 +17,7 @@ from activesteer.analysis.harm import is_lost
 from activesteer.recording import Recording
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import CLAIM, Row, drive
+from activesteer.studies.engine.study_file import label_of
 from tools.population_results import CHANGES, Population, population_study, read_population, summarise
 from tools.population_store import COMPARISON_PAGE, PAGE, comparison_page, page, stored_runs
 
@@ -86,7 +87,7 @@ def test_nominal_verdicts_are_those_of_the_nominal_runs(runs: dict[str, dict[str
 def driven_again(pairs: list[tuple[int, str]]) -> list[tuple[list[Row], list[Row]]]:
     """Return the three runs of each pair of sample and scenario, as they are now and as they are stored."""
     plan = Plan(population_study(stored().samples, stored().seed))
-    scenarios = [label for label, _ in plan.settings.maneuvers]
+    scenarios = [label_of(item) for item in plan.study.maneuvers]
     found = []
     for sample, scenario in pairs:
         first = (scenarios.index(scenario) * stored().samples + sample) * len(SYSTEMS)

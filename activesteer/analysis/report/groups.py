@@ -18,7 +18,7 @@ from activesteer.analysis.claims.scorecard import (
     setting_of,
 )
 from activesteer.analysis.harm import failures, kept
-from activesteer.analysis.path_following import as_far_as_driven, judged_metrics
+from activesteer.analysis.path_following import judged_metrics
 from activesteer.analysis.source import entry
 from activesteer.analysis.step_response import without_response
 from activesteer.core.conventions import RunLook, run_looks
@@ -78,9 +78,8 @@ class ReportedRun(NamedTuple):
 
     @property
     def metrics(self) -> Mapping[str, float]:
-        """Metrics to show: see `without_response` and, for a drive by hand, `as_far_as_driven`."""
-        metrics = without_response(self.recording, self.recording.metrics)
-        return as_far_as_driven(self.recording, metrics) if self.by_hand else metrics
+        """Metrics to show: see `judged_metrics` and `without_response`."""
+        return without_response(self.recording, judged_metrics(self.recording))
 
     @property
     def by_hand(self) -> bool:

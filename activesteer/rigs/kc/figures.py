@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -17,7 +16,7 @@ from activesteer.core.units import three_digits, typeset
 from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
 from activesteer.plotting import Area, Curve, Panel, Picture, save_all
 from activesteer.plotting import draw as drawn
-from activesteer.rigs.kc.metrics import Axle, mean_steer_rad, ratio_curve, roll_angle_rad
+from activesteer.rigs.kc.metrics import DEG, Axle, mean_steer_rad, ratio_curve, roll_angle_rad
 from activesteer.rigs.kc.programme import Sweep, rear_screw_travel_m
 from activesteer.rigs.kc.result import KcMetric, KcResult
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 _LEFT, _RIGHT, _THIRD, _GREY = "#0072b2", "#d55e00", "#009e73", "#777777"
 """Colours that colour-blind readers can distinguish (Okabe and Ito, 2008)."""
 _DASHES: Final = (0.0, (4.0, 3.0))
-_DEG: Final = math.degrees(1.0)
 _AXLES: Final = (("front axle", 0), ("rear axle", 2))
 _NOTHING: Final = 1e-9
 """Value below which a result is a rounding error."""
@@ -38,12 +36,12 @@ _FURTHEST: Final = 0.6
 Row = tuple[str, Callable[[Sweep], Array]]
 """Name and unit of the ordinate, and the function from a sweep to the values of each wheel, shape (n, 4)."""
 
-_TOE: Final[Row] = ("toe [deg]\n(+ toe-in)", lambda sweep: _DEG * sweep.toe_rad)
-_CAMBER: Final[Row] = ("camber [deg]\n(\N{MINUS SIGN} top in)", lambda sweep: _DEG * sweep.camber_rad)
+_TOE: Final[Row] = ("toe [deg]\n(+ toe-in)", lambda sweep: DEG * sweep.toe_rad)
+_CAMBER: Final[Row] = ("camber [deg]\n(\N{MINUS SIGN} top in)", lambda sweep: DEG * sweep.camber_rad)
 _LOAD: Final[Row] = ("vertical force\n[kN]", lambda sweep: 1e-3 * sweep.load_N)
 _WIND_UP: Final[Row] = (
     "wind-up of the\nknuckle [deg]",
-    lambda sweep: _DEG * (sweep.wind_up_rad - sweep.wind_up_rad[sweep.zero]),
+    lambda sweep: DEG * (sweep.wind_up_rad - sweep.wind_up_rad[sweep.zero]),
 )
 
 
@@ -62,20 +60,18 @@ def draw(result: KcResult, folder: str | os.PathLike[str]) -> list[Path]:
     """Draw kinematics and compliance of a car as PNG files, and all of them on the page `kc.html`."""
     pictures = _pictures(result)
     paths = save_all(pictures, folder, f"{result.vehicle}: ")
-    return [*paths, _write_page(result, [make() for make in pictures.values()], Path(folder))]
+    return [*paths, _write_page(result, [*pictures.values()], Path(folder))]
 
 
-def _pictures(result: KcResult) -> dict[str, Callable[[], Picture]]:
-    pictures: dict[str, Callable[[KcResult], Picture]] = {
-        **({"targets": _targets} if result.targeted else {}),
-        "rear_camber": _rear_camber,
-        **{name: partial(_drawn_grid, grid=grid) for name, grid in _GRIDS.items()},
-        "opposite_travel": _opposite_travel,
-        "steering": _steering,
+def _pictures(result: KcResult) -> dict[str, Picture]:
+    return {
+        **({"targets": _targets(result)} if result.targeted else {}),
+        "rear_camber": _rear_camber(result),
+        **{name: _drawn_grid(result, grid) for name, grid in _GRIDS.items()},
+        "opposite_travel": _opposite_travel(result),
+        "steering": _steering(result),
+        **({"rear_steering": _rear_steering(result)} if "rear_steering_bump" in result.curves else {}),
     }
-    if "rear_steering_bump" in result.curves:
-        pictures["rear_steering"] = _rear_steering
-    return {name: partial(make, result) for name, make in pictures.items()}
 
 
 def _write_page(result: KcResult, pictures: Sequence[Picture], folder: Path) -> Path:
@@ -184,7 +180,7 @@ _GRIDS: Final = {
         "force at each wheel [kN] (+ forwards)", 1e-3,
     ),
     "aligning_moment": Grid(
-        "aligning moment", (("steer angle [deg]\n(+ left)", lambda sweep: _DEG * sweep.steer_rad), _CAMBER),
+        "aligning moment", (("steer angle [deg]\n(+ left)", lambda sweep: DEG * sweep.steer_rad), _CAMBER),
         ("aligning_in_phase", "in phase (+ to the left)"), ("aligning_opposed", "left, opposed (+ toe-in)"),
         "moment on each wheel [Nm]", 1.0,
     ),
@@ -213,11 +209,11 @@ def _rear_camber(result: KcResult) -> Picture:
     panels = [
         Panel(
             "wheel travel, both wheels [mm] (+ bump)", "camber [deg] (\N{MINUS SIGN} top in)",
-            _wheels(1e3 * travel.x, _DEG * travel.camber_rad[:, 2:]), zero=True,
+            _wheels(1e3 * travel.x, DEG * travel.camber_rad[:, 2:]), zero=True,
         ),
         Panel(
             "side force at each contact point [kN] (+ to the left)", "camber [deg]",
-            _wheels(1e-3 * force.x, _DEG * force.camber_rad[:, 2:]), zero=True,
+            _wheels(1e-3 * force.x, DEG * force.camber_rad[:, 2:]), zero=True,
         ),
     ]  # fmt: skip
     return Picture("camber angle of the rear suspension", panels, width_in=8.5, height_in=3.6)
@@ -227,7 +223,7 @@ def _opposite_travel(result: KcResult) -> Picture:
     picture = _drawn_grid(result, _GRIDS["opposite_travel"])
     panels = list(picture.panels)
     for place, axle in enumerate(("front", "rear")):
-        roll = _DEG * roll_angle_rad(Axle(axle, result.measured))
+        roll = DEG * roll_angle_rad(Axle(axle, result.measured))
         travel = 1e3 * result.curves["opposite_travel"].x
         panels[place] = panels[place]._replace(above=("roll angle of the body [deg] (+ to the right)", travel, roll))
     return picture._replace(panels=panels)
@@ -237,7 +233,7 @@ def _steering(result: KcResult) -> Picture:
     axle = Axle("front", result.measured)
     sweep = result.curves["steering_rolling"]
     mean, local = ratio_curve(axle)
-    steer = _DEG * (sweep.steer_rad[:, :2] - sweep.steer_rad[sweep.zero, :2])
+    steer = DEG * (sweep.steer_rad[:, :2] - sweep.steer_rad[sweep.zero, :2])
     left = sweep.x >= 0.0
     inner, outer = steer[left, 0], steer[left, 1]
     ackermann = [
@@ -246,15 +242,15 @@ def _steering(result: KcResult) -> Picture:
     ]
     near = np.abs(sweep.x) <= math.radians(100.0)
     parking = [
-        Curve(_DEG * sweep.x[near], _DEG * mean_steer_rad(axle, name)[near], label, colour, "-", 1.5)
+        Curve(DEG * sweep.x[near], DEG * mean_steer_rad(axle, name)[near], label, colour, "-", 1.5)
         for name, label, colour in (
             ("steering_rolling", "no friction", _GREY),
             ("steering_at_rest_left", "at rest, dry, turning left", "#cc79a7"),
             ("steering_at_rest_right", "at rest, dry, turning right", "#e69f00"),
         )
     ]
-    angles = _wheels(_DEG * sweep.x, _DEG * sweep.steer_rad[:, :2])
-    ratio = [Curve(_DEG * mean, local, "", _GREY, "-", 1.8)]
+    angles = _wheels(DEG * sweep.x, DEG * sweep.steer_rad[:, :2])
+    ratio = [Curve(DEG * mean, local, "", _GREY, "-", 1.8)]
     panels = [
         Panel("steering wheel [deg] (+ left)", "steer angle [deg]", angles, zero=True),
         Panel("mean steer angle [deg]", "overall steering ratio", ratio, zero=True),
@@ -270,8 +266,8 @@ def _rear_steering(result: KcResult) -> Picture:
     travel = 1e3 * rear_screw_travel_m(result.measured.vehicle, design.x)
     middle_m = design.contact_m[design.zero, 2, 1]
     shown: dict[str, Callable[[Sweep], Array]] = {
-        "steer angle [deg] (+ to the left)": lambda sweep: _DEG * sweep.steer_rad[:, 2],
-        "camber [deg] (\N{MINUS SIGN} top in)": lambda sweep: _DEG * sweep.camber_rad[:, 2],
+        "steer angle [deg] (+ to the left)": lambda sweep: DEG * sweep.steer_rad[:, 2],
+        "camber [deg] (\N{MINUS SIGN} top in)": lambda sweep: DEG * sweep.camber_rad[:, 2],
         "contact point outwards [mm]": lambda sweep: 1e3 * (sweep.contact_m[:, 2, 1] - middle_m),
     }
     looks = (("_bump", "bump 40 mm", _LEFT), ("", "standing", _GREY), ("_rebound", "rebound 40 mm", _RIGHT))
@@ -295,7 +291,7 @@ def _ideal_outer_deg(axle: Axle, inner_deg: Array) -> Array:
     contact = axle.sweep("steering_rolling").contact_m[axle.sweep("steering_rolling").zero]
     base = float(contact[:2, 0].mean() - contact[2:, 0].mean())
     inner = np.radians(np.maximum(inner_deg, 1e-6))
-    return _DEG * np.arctan(1.0 / (1.0 / np.tan(inner) + (left - right) / base))
+    return DEG * np.arctan(1.0 / (1.0 / np.tan(inner) + (left - right) / base))
 
 
 def _targets(result: KcResult) -> Picture:

@@ -163,7 +163,11 @@ class HeldCar:
             largest = np.abs(step[:-4]).max()
             if largest < _SMALLEST_STEP and size < _ROUNDING:
                 return
-            self._move(step * min(1.0, _LARGEST_STEP / largest if largest > 0.0 else 1.0))
+            step *= min(1.0, _LARGEST_STEP / largest if largest > 0.0 else 1.0)
+            move = np.zeros(self.model.nv)
+            move[self._free] = step[:-4]
+            mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
+            self.load_N += step[-4:]
             residual = self._residual(case)
             before, size = size, np.abs(residual).max()
             if size > _STALE * before and size > _TOLERANCE:
@@ -212,12 +216,6 @@ class HeldCar:
                 wanted = self._reference_m[case.hold][index] + case.height_m[index]
                 missing[index] = (height - wanted) * _HEIGHT_SCALE_NPM
         return np.concatenate([forces[self._free], missing])
-
-    def _move(self, step: Array) -> None:
-        move = np.zeros(self.model.nv)
-        move[self._free] = step[:-4]
-        mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
-        self.load_N += step[-4:]
 
     def _renew(self, case: Case, residual: Array) -> None:
         """Compute and invert the stiffness of the car with its pads, at the current position."""

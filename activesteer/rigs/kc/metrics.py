@@ -56,15 +56,6 @@ class Axle(NamedTuple):
         """Static wheel loads [N], shape (2,)."""
         return self.measured.static_load_N[self.wheels]
 
-    @property
-    def knuckles(self) -> tuple[str, str]:
-        """Names of the knuckles' bodies."""
-        return (f"{self.name[0]}l_knuckle", f"{self.name[0]}r_knuckle")
-
-    def beside(self, name: str) -> Axle:
-        """Return an axle of the same car by its name."""
-        return Axle(name, self.measured)
-
     def sweep(self, name: str) -> Sweep:
         """Return a sweep of the rig."""
         return self.measured.sweeps[name]
@@ -102,7 +93,7 @@ def _ride_rate(axle: Axle) -> float:
 
 def _ride_frequency(axle: Axle) -> float:
     model = axle.measured.vehicle.model
-    unsprung = np.mean([model.body_subtreemass[model.body(name).id] for name in axle.knuckles])
+    unsprung = np.mean([model.body_subtreemass[model.body(f"{axle.name[0]}{side}_knuckle").id] for side in "lr"])
     sprung = axle.load_N.mean() / GRAVITY_MPS2 - unsprung
     return math.sqrt(1e3 * _ride_rate(axle) / sprung) / (2.0 * math.pi)
 
@@ -168,7 +159,7 @@ def _roll_stiffness(axle: Axle) -> float:
 
 
 def _front_roll_stiffness_fraction(axle: Axle) -> float:
-    front, rear = (_roll_stiffness(axle.beside(name)) for name in ("front", "rear"))
+    front, rear = (_roll_stiffness(Axle(name, axle.measured)) for name in ("front", "rear"))
     return 100.0 * front / (front + rear)
 
 
@@ -192,7 +183,7 @@ def _support(axle: Axle, point: str) -> float:
 
 
 def _brake_fraction(axle: Axle) -> float:
-    brakes = axle.measured.parameters.brakes
+    brakes = axle.measured.vehicle.parameters.brakes
     torque = brakes.front_torque_Nm if axle.name == "front" else brakes.rear_torque_Nm
     total = brakes.front_torque_Nm + brakes.rear_torque_Nm
     return torque / total if total > 0.0 else math.nan
@@ -326,7 +317,7 @@ def _top_mount_Npmm(axle: Axle, direction: str) -> float:
 
 
 def _damper_asymmetry(axle: Axle) -> float:
-    dampers = axle.measured.parameters.dampers
+    dampers = axle.measured.vehicle.parameters.dampers
     curve = dampers.front if axle.name == "front" else dampers.rear
     bump, rebound = (abs(float(np.interp(speed, curve.velocity_mps, curve.force_N))) for speed in (0.3, -0.3))
     return rebound / bump if bump > 0.0 else math.inf

@@ -60,15 +60,6 @@ _DIFFERENCE: Final = 1e-6
 """Step of the central differences [m, rad, and per second]."""
 _FASTEST_HZ: Final = 40.0
 """Highest frequency of the modes of body and wheels. Links and steering have higher frequencies [Hz]."""
-NAMES: Final = (
-    "body_bounce",
-    "body_pitch",
-    "body_roll",
-    "wheel_hop_front",
-    "wheel_hop_rear",
-    "tramp_front",
-    "tramp_rear",
-)
 
 
 @dataclass(frozen=True)
@@ -83,7 +74,7 @@ class Mode:
 class Modes:
     """Modes of body and wheels, and roll and pitch gradients."""
 
-    by_name: dict[str, Mode]  # the modes of `NAMES`
+    by_name: dict[str, Mode]  # modes by the names of `_motions`
     body_roll_sliding: Mode  # body roll with tyres that slide sideways without resistance, as on air bearings
     roll_gradient_radps2pm: float  # roll angle per lateral acceleration [rad s2/m], positive to the outside of the turn
     # Pitch angle per deceleration with the brake distribution at full pedal [rad s2/m], positive nose down
@@ -172,13 +163,7 @@ def modes(vehicle: Vehicle, load_N: Array, tyres: tuple[TyreStiffness, TyreStiff
     """Linearise the standing car and name its modes."""
     stuck = _Linear(vehicle, load_N, tyres, grip=1.0)
     sliding = _Linear(vehicle, load_N, tyres, grip=0.0)
-    named = _named(stuck)
-    return Modes(
-        named,
-        _named(sliding)["body_roll"],
-        _roll_gradient(stuck),
-        _pitch_gradient(stuck, vehicle),
-    )
+    return Modes(_named(stuck), _named(sliding)["body_roll"], _roll_gradient(stuck), _pitch_gradient(stuck, vehicle))
 
 
 def _named(linear: _Linear) -> dict[str, Mode]:

@@ -16,7 +16,7 @@ from activesteer.errors import ModelError
 from activesteer.rigs.kc.held_car import Case, HeldCar, WheelPose
 from activesteer.rigs.kc.modes import Modes, TyreStiffness, modes, parking_moment_Nm, tyre_stiffness
 from activesteer.tyre.tyre_parameters import TyreParameters
-from activesteer.vehicle import Vehicle, VehicleParameters
+from activesteer.vehicle import Vehicle
 from activesteer.vehicle import force_block as fb
 
 INWARDS: Final = np.array([-1.0, 1.0, -1.0, 1.0])
@@ -75,12 +75,12 @@ class Sweep:
 def _read(car: HeldCar) -> dict[str, Array]:
     """Return one point of a sweep as the fields of `Sweep`, with the rotations of the wheels."""
     model, data = car.model, car.data
-    poses = [car.wheel(corner) for corner in range(4)]
+    poses = [_in_vehicle_axes(car, corner) for corner in range(4)]
     wheel = model.joint("steering_wheel")
     return {
-        "centre_m": np.array([pose.centre_m for pose in poses]) - car.origin_m,
+        "centre_m": np.array([pose.centre_m for pose in poses]),
         "rotation": np.array([pose.rotation for pose in poses]),
-        "contact_m": np.array([pose.contact_m for pose in poses]) - car.origin_m,
+        "contact_m": np.array([pose.contact_m for pose in poses]),
         "load_N": car.load_N.copy(),
         "damper_m": np.array([data.ten_length[model.tendon(f"{corner}_damper").id] for corner in CORNERS]),
         "rack_m": data.qpos[model.joint("rack").qposadr[0]],
@@ -131,13 +131,7 @@ class SteeringAxis:
 
 
 def steering_axis(right: WheelPose, left: WheelPose, standing: WheelPose, inwards: float) -> SteeringAxis:
-    """Return the screw axis of the motion of a wheel between two positions.
-
-    Args:
-        right: The wheel steered slightly to the right, vehicle axes.
-        left: The wheel steered by the same angle to the left.
-        standing: The wheel straight ahead.
-        inwards: Sign of y towards the middle of the car.
+    """Return the screw axis of a wheel steered slightly right, then equally left; `inwards`: sign of y to the middle.
 
     Source: Chasles' theorem; the point is the solution of least norm of (I - R) p = t.
     """
@@ -184,11 +178,6 @@ class Measured:
     static_load_N: Array  # wheel loads of the standing car, shape (4,)
     modes: Modes
 
-    @property
-    def parameters(self) -> VehicleParameters:
-        """Parameters of the measured vehicle."""
-        return self.vehicle.parameters
-
 
 def measure(vehicle: Vehicle, tyres: tuple[TyreParameters, TyreParameters]) -> Measured:
     """Measure all sweeps and steering axes of a car on the rig."""
@@ -220,10 +209,7 @@ def _sweeps(
         first, last, count = row["points"]
         cases = {x: Case(**{row["load"]: x * unit}) for x in np.linspace(first, last, count).tolist()}
         sweeps[name] = run(car if row.get("springs", True) else free, row["title"], row["variable"], row["unit"], cases)
-    scrub = np.repeat(
-        [parking_moment_Nm(load_N[:2].mean(), tyres[0]), parking_moment_Nm(load_N[2:].mean(), tyres[1])], 2
-    )
-    scrub *= [1.0, 1.0, 0.0, 0.0]
+    scrub = parking_moment_Nm(load_N[:2].mean(), tyres[0]) * np.array([1.0, 1.0, 0.0, 0.0])
     for ending, title, moment in (
         ("rolling", "steering wheel sweep, pads without friction", 0.0 * scrub),
         ("at_rest_left", "steering wheel turned to the left on a dry road, at rest", -scrub),
@@ -235,6 +221,7 @@ def _sweeps(
             for angle in _steering_angles(vehicle).tolist()
         }
         sweeps[f"steering_{ending}"] = run(car, title, "steering wheel angle, positive to the left", "rad", cases)
+    rear_limit_rad = vehicle.model.actuator("rl_steer").ctrlrange[1]
     heights = {"": 0.0}
     if vehicle.parameters.rear_actuator.has_motor:
         heights |= {"_bump": _STEERED_BUMP_M, "_rebound": -_STEERED_BUMP_M}
@@ -242,7 +229,7 @@ def _sweeps(
         title = "rear steering" + (f" with {ending[1:]} of {1e3 * abs(height_m):.0f} mm" if ending else "")
         cases = {
             angle: Case("contact", height_m * np.ones(4), rear_steer_rad=angle)
-            for angle in (np.linspace(-1.0, 1.0, 13) * _rear_range(vehicle)).tolist()
+            for angle in (np.linspace(-1.0, 1.0, 13) * rear_limit_rad).tolist()
         }
         variable = "angle of the rear steering actuators, positive to the left"
         sweeps[f"rear_steering{ending}"] = run(car, title, variable, "rad", cases)
@@ -267,11 +254,6 @@ def _steering_angles(vehicle: Vehicle) -> Array:
     half = np.concatenate([small[small < lock], np.linspace(0.0, lock, _STEERING_POINTS)[2:]])
     half = np.unique(half)
     return np.concatenate([-half[::-1], [0.0], half])
-
-
-def _rear_range(vehicle: Vehicle) -> float:
-    model = vehicle.model
-    return float(model.actuator_ctrlrange[model.actuator("rl_steer").id, 1])
 
 
 def _axes(vehicle: Vehicle, car: HeldCar) -> tuple[SteeringAxis, ...]:

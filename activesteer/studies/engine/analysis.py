@@ -20,6 +20,7 @@ from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import Row, Status, drive
 from activesteer.studies.engine.store import IDENTITY, OUTCOME
+from activesteer.studies.engine.study_file import Place
 
 MAX_SAMPLES: Final = 16384
 """Largest number of rows used: more rows change the indices by less than their confidence intervals."""
@@ -56,50 +57,35 @@ def indices(
     unit = (points - [factor.low for factor in factors]) / [factor.high - factor.low for factor in factors]
     problem = {"num_vars": len(keys), "names": keys, "bounds": [[0.0, 1.0]] * len(keys)}
     try:
-        return _computed(kind, problem, unit, values)
+        from SALib.analyze import morris, rbd_fast, sobol  # noqa: PLC0415 - an extra
     except ImportError as reason:
         raise not_installed(StudyError, "a sensitivity index", "SALib", "study") from reason
-
-
-def _computed(
-    kind: str, problem: dict[str, Any], unit: NDArray[np.float64], values: NDArray[np.float64]
-) -> list[Index]:
-    from SALib.analyze import morris, rbd_fast, sobol  # noqa: PLC0415 - an extra
-
-    keys = problem["names"]
+    names: dict[str, tuple[str, ...]] = {"S1": ("S1", "S1_conf")}
     if kind == "saltelli":
         block = len(keys) + 2
         used = values[: block * (1 << ((len(values) // block).bit_length() - 1))]
         # The estimators assume a metric around zero.
         found = sobol.analyze(problem, (used - used.mean()) / used.std(), calc_second_order=False, seed=0)
-        return [
-            Index(key, name, float(found[name][place]), float(found[f"{name}_conf"][place]))
-            for name in ("S1", "ST")
-            for place, key in enumerate(keys)
-        ]
-    if kind == "morris":
+        names["ST"] = ("ST", "ST_conf")
+    elif kind == "morris":
         whole = len(values) // (len(keys) + 1) * (len(keys) + 1)
-        unit, values = unit[:whole], values[:whole]
-        found = morris.analyze(problem, unit, values, num_levels=MORRIS_LEVELS, seed=0)
-        return [
-            Index(key, "mu*", *(float(found[name][place]) for name in ("mu_star", "mu_star_conf", "sigma")))
-            for place, key in enumerate(keys)
-        ]
-    finite = np.isfinite(values)
-    rows = np.flatnonzero(finite)[:_MAX_RBD_SAMPLES]
-    if len(rows) < _MIN_SAMPLES:
-        return []
-    found = rbd_fast.analyze(problem, unit[rows], values[rows], num_resamples=_RBD_RESAMPLES, seed=0)
+        found = morris.analyze(problem, unit[:whole], values[:whole], num_levels=MORRIS_LEVELS, seed=0)
+        names = {"mu*": ("mu_star", "mu_star_conf", "sigma")}
+    else:
+        rows = np.flatnonzero(finite)[:_MAX_RBD_SAMPLES]
+        if len(rows) < _MIN_SAMPLES:
+            return []
+        found = rbd_fast.analyze(problem, unit[rows], values[rows], num_resamples=_RBD_RESAMPLES, seed=0)
     return [
-        Index(key, "S1", float(found["S1"][place]), float(found["S1_conf"][place])) for place, key in enumerate(keys)
+        Index(key, name, *(float(found[column][place]) for column in columns))
+        for name, columns in names.items()
+        for place, key in enumerate(keys)
     ]
 
 
 MAX_ROWS: Final = 20_000
 """Largest number of rows to compare."""
 
-Place = tuple[int, int, int]
-"""Numbers of manoeuvre, vehicle and controller."""
 Point = tuple[Any, ...]
 """Values of all factors."""
 
@@ -112,7 +98,7 @@ def without_effect(plan: Plan, rows: Iterable[Row]) -> list[str]:
     known: dict[Place, dict[Point, str]] = {}
     for row in rows:
         if row["status"] == Status.OK:
-            known.setdefault(_place(plan, row), {})[tuple(row[key] for key in keys)] = _metrics(row, keys)
+            known.setdefault(plan.study.place_of(row), {})[tuple(row[key] for key in keys)] = _metrics(row, keys)
     return [
         factor.key
         for number, factor in enumerate(plan.study.factors)
@@ -159,17 +145,6 @@ def _driven(plan: Plan, place: Place, point: Point) -> str | None:
     }
     (row,) = drive(settings, [plan.request_with(0, 0, place, values)])
     return _metrics(row, plan.study.keys) if row["status"] == Status.OK else None
-
-
-def _place(plan: Plan, row: Row) -> Place:
-    shared = plan.settings
-    maneuver, vehicle, controller = (
-        [label for label, _ in items].index(row[part])
-        for part, items in (
-            ("maneuver", shared.maneuvers), ("vehicle", shared.vehicles), ("controller", shared.controllers),
-        )
-    )  # fmt: skip
-    return maneuver, vehicle, controller
 
 
 def _metrics(row: Row, keys: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.errors import nearest_names, shown
-from activesteer.scenario import resolve, value_of
+from activesteer.scenario import value_of
 from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.study_file import StudyFile, label_of
 
@@ -77,8 +77,7 @@ class FactorValues:
         if place not in self._nominal:
             study = self.study
             label = label_of(study.maneuvers[maneuver])
-            items = study.maneuvers[maneuver], study.vehicles[vehicle]
-            scenario = resolve(*items, study.overrides, study.driver, study.controllers)
+            scenario = study.scenario(maneuver, vehicle, study.overrides)
             here = {key: of for key, of in self._factors.items() if not of.maneuvers or label in of.maneuvers}
             needed = {key for key, of in here.items() if of.nominal}
             needed |= {other for of in here.values() for other in of.grows_with if other in here}
@@ -116,9 +115,9 @@ class Prior:
             if len(factor.values) == 1:
                 self.nominal[factor.key] = factor.values[0]
                 continue
-            names = factor.maneuvers or tuple(label_of(item) for item in study.maneuvers)
-            maneuver = next(item for item in study.maneuvers if label_of(item) in names)
-            scenario = resolve(maneuver, study.vehicles[0], study.overrides, study.driver, study.controllers)
+            labels = [label_of(item) for item in study.maneuvers]
+            maneuver = next(place for place, label in enumerate(labels) if label in (factor.maneuvers or labels))
+            scenario = study.scenario(maneuver, 0, study.overrides)
             found = value_of(scenario, factor.key, study.controllers)
             if factor.of:  # the ratio or difference that the files have
                 other = value_of(scenario, factor.of, study.controllers)

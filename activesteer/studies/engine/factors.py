@@ -188,10 +188,6 @@ def _pair(given: Sequence[float], source: Source, where: Sequence[str]) -> tuple
     return given[0], given[1]
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= MAX_NUMBER
-
-
 def is_plain(value: object) -> bool:
     """Return whether a value can be varied: a number, a string or a boolean."""
-    return isinstance(value, (bool, str)) or _is_number(value)
+    return isinstance(value, (bool, str)) or (isinstance(value, (int, float)) and abs(value) <= MAX_NUMBER)

@@ -11,9 +11,10 @@ from typing import Any, Final
 import numpy as np
 
 from activesteer.analysis.claims.judge import SYSTEMS
+from activesteer.config import leaves
 from activesteer.controllers import keys_read, load_controller
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
-from activesteer.scenario import Scenario, check_gains, describe, resolve
+from activesteer.scenario import Scenario, check_gains, describe
 from activesteer.studies.engine.design import Samples
 from activesteer.studies.engine.factor_values import FactorValues, label_of
 from activesteer.studies.engine.runs import Request, Settings, digest, present_inputs
@@ -31,28 +32,26 @@ class Plan:
         self.study = study
         self.samples = study.samples()
         self._values = FactorValues(study)
-        labelled = {key: _labelled(study, key) for key in ("maneuvers", "vehicles", "controllers")}
+        labels = {key: _labels(study, key) for key in ("maneuvers", "vehicles", "controllers")}
         self.settings = Settings(
             replace(study, case_list=None, **dict.fromkeys(SEARCHES)),
-            **labelled,
             folder=None if study.recordings == "none" else folder,
             named=tuple(self._named()),
             expected={},
         )
         _check(study, self.samples, self._values)
         self.settings.expected.update(present_inputs(self.settings))
-        table = {key: value for key, value in study.to_table().items() if key not in (*labelled, "title", *SEARCHES)}
+        table = {key: value for key, value in study.to_table().items() if key not in (*labels, "title", *SEARCHES)}
         table["design"] = [samples.columns for samples in self.samples]
         self._maneuver_of: list[int] | None = None
         if study.design.maneuvers == "one":
             order = np.random.default_rng([study.seed, len(study.maneuvers)]).permutation(len(self.samples[0]))
             table["maneuver_of"] = self._maneuver_of = (order % len(study.maneuvers)).tolist()
-        table |= {key: [label for label, _ in labelled[key]] for key in labelled}
-        self.digest = digest({"study": table, "inputs": self.settings.expected})
+        self.digest = digest({"study": table | labels, "inputs": self.settings.expected})
 
     def __len__(self) -> int:
-        shared, driven = self.settings, len(self.settings.maneuvers) if self._maneuver_of is None else 1
-        return driven * len(shared.vehicles) * len(self.samples[0]) * len(shared.controllers)
+        driven = len(self.study.maneuvers) if self._maneuver_of is None else 1
+        return driven * len(self.study.vehicles) * len(self.samples[0]) * len(self.study.controllers)
 
     def _named(self) -> Iterator[tuple[int, int, dict[str, Any]]]:
         """Yield indices of manoeuvre and vehicle with overrides, for each combination of string values."""
@@ -73,10 +72,9 @@ class Plan:
 
     def request(self, run: int) -> Request:
         """Return a run by its number."""
-        shared = self.settings
-        place, controller = divmod(run, len(shared.controllers))
+        place, controller = divmod(run, len(self.study.controllers))
         place, sample = divmod(place, len(self.samples[0]))
-        maneuver, vehicle = divmod(place, len(shared.vehicles))
+        maneuver, vehicle = divmod(place, len(self.study.vehicles))
         if self._maneuver_of is not None:
             maneuver = self._maneuver_of[sample]
         samples = self.samples[controller if len(self.samples) > 1 else 0]
@@ -103,14 +101,13 @@ def _with_one_changed(row: tuple[Any, ...], values: Sequence[Sequence[Any]]) -> 
         yield from ((*row[:place], value, *row[place + 1 :]) for value in allowed)
 
 
-def _labelled(study: StudyFile, key: str) -> Any:
-    """Label each item with its name without folders, so that results are equal on every machine."""
-    items = getattr(study, key)
-    labels = [label_of(item) for item in items]
+def _labels(study: StudyFile, key: str) -> list[str]:
+    """Return the unique names of the items without folders, so that results are equal on every machine."""
+    labels = [label_of(item) for item in getattr(study, key)]
     for label in labels:
         if labels.count(label) > 1:
             raise study.source.fail((key,), f"two of them have the name {label!r}; names must be unique")
-    return tuple(zip(labels, items, strict=True))
+    return labels
 
 
 def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorValues) -> None:
@@ -129,9 +126,11 @@ def _check(study: StudyFile, samples: Sequence[Samples], factor_values: FactorVa
                 if key in factor_values.overrides(*place, {key: values[0]}):
                     effective.add(key)
                 continue
-            described = _described(factor_values, place, samples[0], key, values)
-            changed = {leaf for other in described for leaf in _differing(described[0], other)}
-            if any(_is_read(leaf, base, study.controllers) for leaf in changed):
+            one, *others = _described(factor_values, place, samples[0], key, values)
+            differing = (
+                path for other in others for path in one.keys() | other.keys() if one.get(path) != other.get(path)
+            )
+            if any(_is_read(path, base, study.controllers) for path in differing):
                 effective.add(key)
     try:
         check_gains(study.overrides, study.controllers)
@@ -147,18 +146,17 @@ def _resolved(
     factor_values: FactorValues, place: tuple[int, int], sample: Mapping[str, Any], key: str = ""
 ) -> Scenario:
     study, (maneuver, vehicle) = factor_values.study, place
-    items = study.maneuvers[maneuver], study.vehicles[vehicle]
     try:
-        overrides = study.overrides | factor_values.overrides(*place, sample)
-        return resolve(*items, overrides, study.driver, study.controllers)
+        return study.scenario(maneuver, vehicle, study.overrides | factor_values.overrides(*place, sample))
     except ActiveSteerError as error:
-        error.add_note(f"in {label_of(items[0])} with {label_of(items[1])}" + (f", factor {key}" if key else ""))
+        where = f"in {label_of(study.maneuvers[maneuver])} with {label_of(study.vehicles[vehicle])}"
+        error.add_note(where + (f", factor {key}" if key else ""))
         raise
 
 
 def _described(
     factor_values: FactorValues, place: tuple[int, int], samples: Samples, key: str, values: Sequence[Any]
-) -> list[dict[str, Any]]:
+) -> list[dict[tuple[str, ...], Any]]:
     """Return the inputs of a run at each value of a key, with the other keys from the first sample if possible."""
     study = factor_values.study
     conditions = next((factor.conditions for factor in study.factors if factor.key == key), {})
@@ -203,29 +201,14 @@ def _extremes(study: StudyFile, samples: Sequence[Samples]) -> dict[str, list[An
     return found
 
 
-def _leaves(scenario: Scenario) -> dict[str, Any]:
-    """Return all inputs of a run by dotted key."""
-    return dict(_walk(describe(scenario) | {"overrides": {}, "files": scenario.files}, ""))
+def _leaves(scenario: Scenario) -> dict[tuple[str, ...], Any]:
+    """Return all inputs of a run by path."""
+    return leaves(describe(scenario) | {"overrides": {}, "files": scenario.files})
 
 
-def _walk(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from _walk(item, f"{path}.{key}" if path else str(key))
-    elif isinstance(value, list):
-        for number, item in enumerate(value):
-            yield from _walk(item, f"{path}.{number}")
-    else:
-        yield path, value
-
-
-def _differing(a: Mapping[str, Any], b: Mapping[str, Any]) -> set[str]:
-    return {key for key in a.keys() | b.keys() if a.get(key) != b.get(key)}
-
-
-def _is_read(leaf: str, scenario: Scenario, controllers: Sequence[str]) -> bool:
+def _is_read(path: tuple[str, ...], scenario: Scenario, controllers: Sequence[str]) -> bool:
     """Return whether a key affects any run: a gain needs its controller, a preview needs a path."""
-    part, first, *rest = [*leaf.split("."), "", ""]
+    part, first, *rest = [*path, "", ""]
     follows_path = scenario.maneuver.course is not None
     if part == "files":
         return True

@@ -24,7 +24,7 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.pages import Page, Section, Table, Text, render_page
 from activesteer.plotting import Curve, Panel, Picture, draw, save
 from activesteer.studies.engine.analysis import MAX_SAMPLES, indices
-from activesteer.studies.engine.factor_values import FactorValues, label_of
+from activesteer.studies.engine.factor_values import FactorValues
 from activesteer.studies.engine.runs import CURVE, run_command
 from activesteer.studies.engine.store import IDENTITY, OUTCOME, Progress, Store
 from activesteer.studies.engine.study_file import StudyFile, read_study
@@ -116,7 +116,8 @@ def _data(study: StudyFile, table: pa.Table) -> dict[str, Any]:
     values = {metric.name: values[metric.name] * metric.unit.factor for metric in found}
     who = {name: _codes(table[name]) for name in ("maneuver", "vehicle", "controller")}
     groups = sorted(set(zip(who["maneuver"][1].tolist(), who["vehicle"][1].tolist(), strict=True)))
-    shown = _shown_rows(table)
+    # Evenly spread, complete samples keep paired runs together.
+    shown = np.flatnonzero(table["sample"].to_numpy() % -(-table.num_rows // _SHOWN_ROWS) == 0)
     shown_table = table.take(pa.array(shown))
     return {
         "controllers": who["controller"][0],
@@ -143,13 +144,6 @@ def _codes(column: pa.ChunkedArray) -> tuple[list[str], Places]:
     """Return the distinct values of a column in order of occurrence, and the index of each row's value."""
     encoded = column.combine_chunks().dictionary_encode()
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy()
-
-
-def _shown_rows(table: pa.Table) -> Places:
-    """Return the rows of evenly spread, complete samples, which keep paired runs together."""
-    samples = table["sample"].to_numpy()
-    every = -(-table.num_rows // _SHOWN_ROWS)
-    return np.flatnonzero(samples % every == 0)
 
 
 def _acting(study: StudyFile, key: str, rows: pa.Table) -> list[Any]:
@@ -306,16 +300,13 @@ def _extremes(values: FactorValues, table: pa.Table, rows: Places, part: Array) 
 def _command(factor_values: FactorValues, row: Mapping[str, Any]) -> str:
     """Return the command line that drives and replays a run, empty if its manoeuvre or vehicle has no file."""
     study = factor_values.study
-    given = {}
-    place = {}
-    for part, items in (("maneuver", study.maneuvers), ("vehicle", study.vehicles), ("controller", study.controllers)):
-        place[part] = [label_of(item) for item in items].index(row[part])
-        given[part] = items[place[part]]
-    if not all(isinstance(item, str) for item in given.values()):
+    place = study.place_of(row)
+    maneuver, vehicle = study.maneuvers[place[0]], study.vehicles[place[1]]
+    if not (isinstance(maneuver, str) and isinstance(vehicle, str)):
         return ""
     sample = {key: row[key] for key in study.keys}
-    values = study.overrides | factor_values.overrides(place["maneuver"], place["vehicle"], sample)
-    command = run_command(given["maneuver"], given["controller"], given["vehicle"], values, study.driver)
+    values = study.overrides | factor_values.overrides(*place[:2], sample)
+    command = run_command(maneuver, study.controllers[place[2]], vehicle, values, study.driver)
     file = f"run-{row['run']}.mcap"
     return f"{command} -o {file} && activesteer replay {file}"
 

@@ -18,7 +18,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -34,11 +34,11 @@ from activesteer.errors import ActiveSteerError, StudyError
 from activesteer.plugins.file import format_of, source_of
 from activesteer.recording import Recording
 from activesteer.resources import DEFAULT_DRIVER
-from activesteer.scenario import FileOrTable, Scenario, describe, resolve
+from activesteer.scenario import FileOrTable, Scenario, describe
 from activesteer.simulation import preparation
 from activesteer.simulation.preparation import with_amplitude_found
 from activesteer.simulation.runner import run_scenario
-from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.study_file import StudyFile, label_of
 from activesteer.studies.engine.workers import Workers
 from activesteer.vehicle.native_forces import install_native_forces
 
@@ -51,13 +51,8 @@ _DECIDING: Final = (
 
 def digest(value: Any) -> str:
     """Return the hash of JSON values that may contain bytes."""
-    return hashlib.sha256(json.dumps(value, sort_keys=True, default=_of_bytes).encode()).hexdigest()
-
-
-def _of_bytes(value: object) -> str:
-    if not isinstance(value, bytes):
-        raise TypeError(f"{type(value).__name__} has no hash that is the same everywhere")
-    return hashlib.sha256(value).hexdigest()
+    text = json.dumps(value, sort_keys=True, default=lambda content: hashlib.sha256(content).hexdigest())
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @functools.cache
@@ -66,9 +61,9 @@ def source_digest() -> str:
     package = Path(__file__).parents[2]
     found = {}
     for part in _DECIDING:
-        inside = (path for path in (package / part).rglob("*") if path.suffix in (".py", ".txt"))
-        for path in [package / part] if part.endswith(".py") else sorted(inside):
-            found[path.relative_to(package).as_posix()] = path.read_bytes()
+        for path in sorted((package / part).rglob("*")):
+            if path.suffix in (".py", ".txt"):
+                found[path.relative_to(package).as_posix()] = path.read_bytes()
     return digest(found)[:12]
 
 
@@ -76,12 +71,7 @@ def source_digest() -> str:
 def versions() -> dict[str, str]:
     """Return the versions of activesteer, its sources and its dependencies."""
     found = {"activesteer": __version__, "source": source_digest(), "python": platform.python_version()}
-    for package in ("mujoco", "numpy", "scipy", "numba"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+    return found | {package: version(package) for package in ("mujoco", "numpy", "scipy", "numba")}
 
 
 def deciding_versions() -> dict[str, str]:
@@ -120,9 +110,6 @@ class Settings:
     """Settings of all runs of a study, kept small because every task carries them."""
 
     study: StudyFile  # the study without its cases and searches
-    maneuvers: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each manoeuvre
-    vehicles: tuple[tuple[str, FileOrTable], ...]  # label and name, path or table of each vehicle
-    controllers: tuple[tuple[str, str], ...]  # label and name or file of each controller
     folder: Path | None
     # Indices of manoeuvre and vehicle with overrides, one for each combination of text factors, which may name other
     # files.
@@ -147,31 +134,21 @@ class Request(NamedTuple):
 def present_inputs(settings: Settings) -> dict[str, str]:
     """Return the hashes of `Settings.expected` for the files on this machine."""
     found = {f"{_VERSION}{key}": value for key, value in deciding_versions().items()}
-    places = itertools.product(range(len(settings.maneuvers)), range(len(settings.vehicles)))
-    for maneuver, vehicle, overrides in (*((*place, settings.study.overrides) for place in places), *settings.named):
-        scenario = scenario_of(settings, maneuver, vehicle, overrides)
-        found[files_key(settings, maneuver, vehicle, overrides)] = digest(scenario.files)
-    for label, controller in settings.controllers:
-        found[f"controller {label}"] = controller_digest(controller)
-    return found
+    study = settings.study
+    places = itertools.product(range(len(study.maneuvers)), range(len(study.vehicles)), [study.overrides])
+    for place in (*places, *settings.named):
+        found[files_key(study, *place)] = digest(study.scenario(*place).files)
+    return found | {f"controller {label_of(each)}": controller_digest(each) for each in study.controllers}
 
 
-def scenario_of(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> Scenario:
-    """Return the scenario of a pair of manoeuvre and vehicle."""
-    controllers = [controller for _, controller in settings.controllers]
-    return resolve(
-        settings.maneuvers[maneuver][1], settings.vehicles[vehicle][1], overrides, settings.study.driver, controllers
-    )
-
-
-def files_key(settings: Settings, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:
+def files_key(study: StudyFile, maneuver: int, vehicle: int, overrides: dict[str, Any]) -> str:
     """Return the key of these files in `Settings.expected`."""
     texts = [
         f"{key} = {value}"
         for key, value in sorted(overrides.items())
-        if isinstance(value, str) and value != settings.study.overrides.get(key)
+        if isinstance(value, str) and value != study.overrides.get(key)
     ]
-    words = f"files of {settings.maneuvers[maneuver][0]} and {settings.vehicles[vehicle][0]}"
+    words = f"files of {label_of(study.maneuvers[maneuver])} and {label_of(study.vehicles[vehicle])}"
     return f"{words} with {', '.join(texts)}" if texts else words
 
 
@@ -269,14 +246,10 @@ def drive(settings: Settings, requests: Sequence[Request], most_s: float = math.
         if rows and time.monotonic() >= end_s:
             break
         rows += _drive_sample(settings, list(group))
-    _give_memory_back()
-    return rows
-
-
-def _give_memory_back() -> None:
-    """Return free memory to the system. The C library would otherwise fragment it."""
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # other C libraries have no such function
+    # Return free memory to the system. The C library would otherwise fragment it; others have no such function.
+    with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
+    return rows
 
 
 _seen: dict[str, str] = {}
@@ -291,28 +264,27 @@ def _problem(key: str, settings: Settings) -> str:
 
 def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
     """Drive the runs of one sample: one car on one road with each controller in turn."""
-    first = requests[0]
+    study, first = settings.study, requests[0]
     place = first.maneuver, first.vehicle, first.overrides
     try:
-        scenario, key = scenario_of(settings, *place), files_key(settings, *place)
+        scenario, key = study.scenario(*place), files_key(study, *place)
         if digest(scenario.files) != settings.expected[key]:
             raise StudyError(f"{key}: changed while the study ran")
         with preparation.not_on_disk():
-            ready = with_amplitude_found(scenario, settings.study.timestep_s)
+            ready = with_amplitude_found(scenario, study.timestep_s)
     except ActiveSteerError as error:
         return [failed_row(settings, request, Status.FAILED, _words_of(error)) for request in requests]
     rows = []
     recordings: dict[str, Recording] = {}
     for request in requests:
-        label, controller = settings.controllers[request.controller]
-        row = _row(settings, request)
-        row["run_id"] = run_id(scenario, controller, settings.study.seed, settings.study.timestep_s)
+        controller, row = study.controllers[request.controller], _row(study, request)
+        row["run_id"] = run_id(scenario, controller, study.seed, study.timestep_s)
         recording = _drive_one(settings, request, row, ready, controller)
-        if settings.study.claims and recording is not None:
-            recordings[label] = recording
+        if study.claims and recording is not None:
+            recordings[label_of(controller)] = recording
         rows.append(row)
-    if settings.study.claims:
-        claims = _claims(settings.maneuvers[first.maneuver][0], recordings)
+    if study.claims:
+        claims = _claims(label_of(study.maneuvers[first.maneuver]), recordings)
         for row in rows:
             row.update(claims)
     return rows
@@ -320,11 +292,13 @@ def _drive_sample(settings: Settings, requests: Sequence[Request]) -> list[Row]:
 
 def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, controller: str) -> Recording | None:
     """Drive one run, fill its row, and return the recording of a complete run."""
-    path = _recording_path(settings, request)
-    every = settings.study.recordings
+    study = settings.study
+    every, path = study.recordings, None
+    if settings.folder is not None and every != "none":
+        path = settings.folder / f"{request.run:07d}-{row['maneuver']}-{file_word(row['controller'])}.mcap"
     keeps = every == "all" or (isinstance(every, int) and request.sample % every == 0)
     try:
-        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=settings.study.timestep_s)
+        recording = run_scenario(ready, controller, path=path if keeps else None, timestep_s=study.timestep_s)
     except ActiveSteerError as error:
         row |= {"status": Status.FAILED.value, "error": _words_of(error)}
         if every == "failed" and path is not None and error.recording is not None and len(error.recording):
@@ -333,23 +307,14 @@ def _drive_one(settings: Settings, request: Request, row: Row, ready: Scenario, 
             except ActiveSteerError as reason:
                 row["error"] = f"{row['error']}; {reason}"
         return None
-    every_steps = max(1, round(CURVE_STEP_S / settings.study.timestep_s))
-    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in settings.study.curves)
+    every_steps = max(1, round(CURVE_STEP_S / study.timestep_s))
+    row.update((f"{CURVE}{name}", np.float32(recording[name][::every_steps])) for name in study.curves)
     if problem := recording.metadata.get("metrics_error"):
         row |= {"status": Status.UNEVALUATED.value, "error": str(problem)[:_ERROR_CHARACTERS]}
         return None
     row["status"] = Status.OK.value
-    row.update(
-        (name, float(value)) for name, value in recording.metrics.items() if _is_kept(settings.study.metrics, name)
-    )
+    row.update((name, float(value)) for name, value in recording.metrics.items() if _is_kept(study.metrics, name))
     return recording
-
-
-def _recording_path(settings: Settings, request: Request) -> Path | None:
-    if settings.folder is None or settings.study.recordings == "none":
-        return None
-    maneuver, controller = settings.maneuvers[request.maneuver][0], settings.controllers[request.controller][0]
-    return settings.folder / f"{request.run:07d}-{maneuver}-{file_word(controller)}.mcap"
 
 
 @functools.lru_cache(maxsize=4096)
@@ -370,17 +335,17 @@ def _claims(maneuver: str, recordings: Mapping[str, Recording]) -> dict[str, flo
 
 def failed_row(settings: Settings, request: Request, status: Status, problem: str) -> Row:
     """Return the row of an incomplete run."""
-    return _row(settings, request) | {"status": status.value, "error": problem}
+    return _row(settings.study, request) | {"status": status.value, "error": problem}
 
 
-def _row(settings: Settings, request: Request) -> Row:
+def _row(study: StudyFile, request: Request) -> Row:
     return {
         "run": request.run,
         "run_id": "",
         "sample": request.sample,
-        "maneuver": settings.maneuvers[request.maneuver][0],
-        "vehicle": settings.vehicles[request.vehicle][0],
-        "controller": settings.controllers[request.controller][0],
+        "maneuver": label_of(study.maneuvers[request.maneuver]),
+        "vehicle": label_of(study.vehicles[request.vehicle]),
+        "controller": label_of(study.controllers[request.controller]),
         **request.factors,
         "status": Status.FAILED.value,
         "error": "",

@@ -135,7 +135,7 @@ class Store:
         if (self.folder / RESULTS).exists():
             return []
         found, begin = [], 0
-        for first, last in self._spans():
+        for first, last in sorted(tuple(map(int, path.stem.split("-"))) for path in self._paths()):
             if first > begin:
                 found.append(range(begin, first))
             begin = max(begin, last + 1)
@@ -160,8 +160,6 @@ class Store:
 
     def read(self) -> pa.Table:
         """Return all rows so far, in the order of the runs."""
-        if (self.folder / RESULTS).exists():
-            return next(_tables([self.folder / RESULTS]))
         return joined(list(_tables(self._paths())) or [table_of([], self._factors)])
 
     def progress(self) -> Progress:
@@ -169,8 +167,7 @@ class Store:
         about = read_environment(self.folder)
         counts: dict[str, int] = {}
         errors: dict[str, int] = {}
-        joined = self.folder / RESULTS
-        for table in _tables([joined] if joined.exists() else self._paths(), ["status", "error"]):
+        for table in _tables(self._paths(), ["status", "error"]):
             for column, found in (("status", counts), ("error", errors)):
                 for entry in table[column].combine_chunks().value_counts().to_pylist():
                     if entry["values"]:
@@ -191,13 +188,9 @@ class Store:
             return [str(key)[:_KEY_CHARACTERS] for key in found] if isinstance(found, list) else []
         return []
 
-    def _spans(self) -> list[tuple[int, int]]:
-        return sorted(
-            (int(first), int(last)) for first, _, last in (path.stem.partition("-") for path in self._paths())
-        )
-
     def _paths(self) -> list[Path]:
-        return sorted(self._parts.glob("[0-9]*.parquet"))
+        results = self.folder / RESULTS
+        return [results] if results.exists() else sorted(self._parts.glob("[0-9]*.parquet"))
 
 
 def read_environment(folder: Path) -> dict[str, Any]:

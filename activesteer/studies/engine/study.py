@@ -95,11 +95,11 @@ def study(
             # Find errors that would occur in every run before the first one.
             prepare(workers, plan.settings)
             _drive_all(plan, store, workers, missing, limit, progress)
-        if not store.missing(len(plan)):
+        if complete := not store.missing(len(plan)):
             store.join()
         table = store.read()
         _warn_of_patterns(parsed, table)
-        if missing and not store.missing(len(plan)) and parsed.case_list is None:
+        if missing and complete and parsed.case_list is None:
             curves = [name for name in table.column_names if name.startswith(CURVE)]
             rows = table.slice(0, MAX_ROWS).drop_columns(curves)
             store.note_without_effect(without_effect(plan, rows.to_pylist()))
@@ -127,7 +127,7 @@ def _drive_all(
     total = len(plan)
     left = sum(len(span) for span in missing)
     done, here, failed = total - left, 0, 0
-    size = task_size(left, len(plan.settings.controllers), workers.in_flight)
+    size = task_size(left, len(plan.study.controllers), workers.in_flight)
     tasks = (
         (requests, drive, plan.settings, requests, _KEPT_EVERY_S) for requests in _tasks(plan, missing, size, limit)
     )

@@ -14,7 +14,7 @@ from activesteer.core.conventions import DEFAULT_TIMESTEP_S
 from activesteer.core.files import user_path
 from activesteer.errors import StudyError, shown
 from activesteer.resources import DEFAULT_DRIVER, find_study
-from activesteer.scenario import FileOrTable
+from activesteer.scenario import FileOrTable, Scenario, resolve
 from activesteer.studies.engine.design import DesignTable, Samples, cases, choose_design, draw, read_cases
 from activesteer.studies.engine.factors import Factor, is_plain, read_factor
 
@@ -26,6 +26,9 @@ SEARCHES: Final = {
 _KEPT: Final = ("none", "failed", "all")
 _LISTS: Final = ("maneuvers", "controllers", "vehicles", "metrics", "curves")
 """Keys with a list, or with its only name."""
+
+Place = tuple[int, int, int]
+"""Numbers of manoeuvre, vehicle and controller in their lists."""
 
 
 def label_of(item: FileOrTable) -> str:
@@ -56,7 +59,7 @@ class _Common:
     claims: bool = False  # whether to check the paper's claims for every sample; this needs its three systems
     timestep_s: Annotated[float, Range(1e-9)] = DEFAULT_TIMESTEP_S  # step of engine, driver and controller [s]
     tune: dict[str, Any] | None = None  # the table [tune], unparsed; see `tuning`
-    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fit_file`
+    fit: dict[str, Any] | None = None  # the table [fit], unparsed; see `measured.fitting`
     title: str = ""  # one line for the report
 
 
@@ -82,6 +85,16 @@ class StudyFile(_Common):
     def keys(self) -> tuple[str, ...]:
         """Varied keys, in the order of the file."""
         return tuple(self.case_list.columns) if self.case_list else tuple(factor.key for factor in self.factors)
+
+    def scenario(self, maneuver: int, vehicle: int, overrides: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of a manoeuvre and a vehicle, by their numbers."""
+        return resolve(self.maneuvers[maneuver], self.vehicles[vehicle], overrides, self.driver, self.controllers)
+
+    def place_of(self, row: Mapping[str, Any]) -> Place:
+        """Return the numbers of manoeuvre, vehicle and controller of a row of the results."""
+        parts = ((self.maneuvers, "maneuver"), (self.vehicles, "vehicle"), (self.controllers, "controller"))
+        maneuver, vehicle, controller = ([*map(label_of, items)].index(row[part]) for items, part in parts)
+        return maneuver, vehicle, controller
 
     def to_table(self) -> dict[str, Any]:
         """Return the study as the table of a study file."""

@@ -22,7 +22,7 @@ from activesteer.studies.engine.factors import Factor
 from activesteer.studies.engine.plan import Plan
 from activesteer.studies.engine.runs import DISTANCE, Row, Status
 from activesteer.studies.engine.store import IDENTITY, OUTCOME
-from activesteer.studies.engine.study_file import StudyFile
+from activesteer.studies.engine.study_file import StudyFile, label_of
 
 TABLE: Final = "tune"
 _MOST: Final = 1e6
@@ -129,8 +129,8 @@ class Judge:
 
     def __init__(self, plan: Plan, table: TuneTable, examined: str = "") -> None:
         """Parse the expressions of a table, with `controller` as the examined controller."""
-        study, shared, self._examined = plan.study, plan.settings, examined
-        controllers, maneuvers = ([label for label, _ in items] for items in (shared.controllers, shared.maneuvers))
+        study, self._examined = plan.study, examined
+        controllers, maneuvers = ([*map(label_of, items)] for items in (study.controllers, study.maneuvers))
         claims = {claim: (f"{DISTANCE}{claim}", name) for claim, name in SCENARIO_OF.items() if name in maneuvers}
         names = Names(controllers, maneuvers, examined, claims if study.claims else {})
         self._source, self._about = study.source, {*IDENTITY, *OUTCOME, *study.keys}

@@ -12,7 +12,7 @@ import json
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -29,14 +29,12 @@ from activesteer.studies.engine.runs import Request, Row, Status, drive, prepare
 from activesteer.studies.engine.store import LOCK, locked
 from activesteer.studies.engine.study_file import StudyFile, label_of, read_study
 from activesteer.studies.engine.tune_table import TABLE, Goal, Judge, TuneTable, read_table
-from activesteer.studies.engine.workers import TaskQueue, Workers, workers_for
+from activesteer.studies.engine.workers import Progress, TaskQueue, Workers, workers_for
 
 _STARTUP: Final = 0.2
 """Fraction of the sets that the sampler draws at random before it learns to violate a requirement."""
 _WARM: Final = 10
 """Number of times that a warm start of CMA-ES counts its source: it learns from the best tenth of its sources."""
-Progress = Callable[[str, int, int], None]
-"""Callback after every set, with the name of the search, its finished sets, and their total."""
 
 
 @dataclass(frozen=True)
@@ -132,9 +130,8 @@ def tune(
     trials: int | None = None,
     runs: int | None = None,
     jobs: int | None = None,
-    client: Any = None,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> list[Tuning]:
     """Search the ranges of a study's factors.
 
@@ -150,7 +147,7 @@ def tune(
         raise StudyError(f"{folder} holds a study; use a new folder for the search", value=folder)
     searches = _searches(read_study(study_file, TABLE), folder, controllers, maneuvers)
     _optuna()
-    with workers_for(jobs, client=client, scheduler=scheduler) as workers:
+    with workers_for(jobs, scheduler=scheduler) as workers:
         return [search.run(workers, trials, runs, progress) for search in searches]
 
 
@@ -212,12 +209,11 @@ class _Search:
         self.plan, self.table, self.folder, self.goal = Plan(study), table, folder, table.goal
         self.examined, self.maneuver = examined, maneuver
         self.judge = Judge(self.plan, table, examined)
-        shared = self.plan.settings
-        items = (shared.maneuvers, shared.vehicles, shared.controllers)
+        items = (study.maneuvers, study.vehicles, study.controllers)
         self._places: Any = list(itertools.product(*(range(len(item)) for item in items)))
         self._seen: Sequence[Row] = ()
 
-    def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress | None) -> Tuning:
+    def run(self, workers: Workers, trials: int | None, runs: int | None, progress: Progress) -> Tuning:
         """Try the remaining sets, and store the result."""
         total = self.table.trials if trials is None else trials
         total = max(1, runs // len(self._places)) if runs is not None else total
@@ -258,7 +254,7 @@ class _Search:
         storage = JournalStorage(journal.JournalFileBackend(str(path), lock_obj=lock))
         return optuna.create_study(storage=storage, study_name=TABLE, load_if_exists=True, directions=directions)
 
-    def _search(self, made: Any, total: int, workers: Workers, progress: Progress | None) -> None:
+    def _search(self, made: Any, total: int, workers: Workers, progress: Progress) -> None:
         states = _optuna().trial.TrialState
         for left in made.get_trials(deepcopy=False, states=(states.RUNNING,)):  # left by a killed process
             made.tell(left.number, state=states.FAIL)
@@ -277,8 +273,7 @@ class _Search:
             for trial, rows, error in TaskQueue(workers).outcomes(self._tasks(made, end - done)):
                 done += 1
                 self._tell(made, trial, [] if error is not None else rows)
-                if progress is not None:
-                    progress(f"{self.examined} {self.maneuver}".strip(), done, total)
+                progress(f"{self.examined} {self.maneuver}".strip(), done, total)
 
     def _tasks(self, made: Any, count: int) -> Iterator[tuple[Any, ...]]:
         for _ in range(count):

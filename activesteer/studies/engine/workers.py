@@ -26,6 +26,9 @@ _BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _MOST_JOBS: Final = 16
 """Number of processes that is allowed on a machine with few processors; four times the processors on a larger one."""
 
+Progress = Callable[[str, int, int], None]
+"""Callback with the name of a finished part or of a search, the number of finished parts, and the total."""
+
 
 class Workers:
     """Worker in this process, which executes every task immediately; `in_flight` tasks can be submitted at a time."""

@@ -28,11 +28,9 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import groupby
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -51,7 +49,7 @@ from activesteer.controllers.linear_form import (
 )
 from activesteer.core.conventions import GRAVITY_MPS2, Array
 from activesteer.core.signals import Measurement
-from activesteer.pages import Page, Section, Table, Text, failed, passed, write_page
+from activesteer.pages import Page, Section, Table, Text, failed, passed
 from activesteer.plotting import Area, Curve, Panel, Picture
 from activesteer.scenario import FileOrTable, Scenario, check_gains, resolve
 from activesteer.sensors.parameters import Sensor
@@ -352,8 +350,8 @@ _LEAD: Final = (
 )
 
 
-def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str | os.PathLike[str]) -> Path:
-    """Write `margins.html` and return its path."""
+def margins_page(found: Sequence[LoopMargins], vehicle: str) -> Page:
+    """Return the page of the margins."""
     loops = sorted(found, key=_name)  # the speeds of a loop stay in their order
     drawn = [each for each in loops if each.curves]
     sections = [Section(tables=[_table(loops)], pictures=[_picture(drawn)] if drawn else [])]
@@ -366,16 +364,14 @@ def write_margins_page(found: Sequence[LoopMargins], vehicle: str, folder: str |
     ]
     if drawn:
         lead.append(_LEAD)
-    return write_page(Page(f"activesteer linearise: {vehicle}", title, lead, sections), Path(folder) / "margins.html")
+    return Page(f"activesteer linearise: {vehicle}", title, lead, sections)
 
 
 def disk(alpha: float) -> tuple[float, float]:
-    """Return centre and radius of the disk that the loop gain avoids, for a disk margin.
+    """Return centre and radius of the disk that the loop gain avoids, for a balanced disk margin from 0 to 2 [-].
 
     It holds all L with |1 + L| < alpha / 2 |1 - L|, on whose edge a factor of the size alpha makes the loop marginal.
-
-    Args:
-        alpha: Balanced disk margin, above 0 and below 2 [-]; at 2 the disk is a half-plane.
+    At 2 the disk is a half-plane.
 
     Source: P. Seiler, A. Packard, P. Gahinet, An Introduction to Disk Margins, 2020, section IV.
     """
@@ -437,7 +433,7 @@ def worst_margins(
     vehicle: FileOrTable = "compact",
     speeds_kmh: Sequence[float] = SPEEDS_KMH,
     overrides: Mapping[str, Any] | None = None,
-    progress: Callable[[StudyProgress], None] | None = None,
+    progress: Callable[[StudyProgress], None] = lambda _: None,
     *,
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -470,16 +466,17 @@ def worst_margins(
         def report(place: int, _: int) -> None:
             nonlocal looked_at
             looked_at += len(parts[place])
-            if progress is not None:
-                progress(StudyProgress(looked_at, len(requests), 0, looked_at))
+            progress(StudyProgress(looked_at, len(requests), 0, looked_at))
 
         look = functools.partial(_margins, controllers, vehicle, speeds_kmh)
         found = in_parallel(look, [(part,) for part in parts], report=report, workers=workers)
-    every = list(itertools.chain.from_iterable(found))
-    worst = []
-    for row in zip(*every, strict=True):
-        least = min(range(len(row)), key=lambda number: row[number].margins.disk)
-        worst.append(
-            replace(row[least], margins=weakest([each.margins for each in row]), factors=requests[least].factors)
-        )
-    return worst
+    # A car whose controller does not use an actuator lacks its loop.
+    cars_of: dict[tuple[str, str, float], list[LoopMargins]] = {}
+    for request, loops in zip(requests, itertools.chain.from_iterable(found), strict=True):
+        for each in loops:
+            own = replace(each, factors=request.factors)
+            cars_of.setdefault((each.controller, each.loop, each.speed_kmh), []).append(own)
+    return [
+        replace(min(every, key=lambda each: each.margins.disk), margins=weakest([each.margins for each in every]))
+        for every in cars_of.values()
+    ]

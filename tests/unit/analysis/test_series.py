@@ -14,14 +14,13 @@ from activesteer.analysis.series import (
     lag,
     largest_rate,
     low_pass,
-    offset,
     rate_rms,
     rms,
     smooth,
     step_response,
     timestep,
-    zeroing_range,
 )
+from activesteer.analysis.sine_with_dwell import _offset, _zeroing_range
 from activesteer.errors import RecordingError
 from tests.raising import raises
 from tests.unit.analysis.synthetic import SyntheticRun, first_order, second_order
@@ -221,28 +220,28 @@ def ramp(begin_s: float, length_s: float) -> np.ndarray:
 
 
 def test_range_is_the_second_before_the_average_rate_passes_75_deg_per_second():
-    samples = zeroing_range(TIMES_S, ramp(2.0, 0.5))
+    samples = _zeroing_range(TIMES_S, ramp(2.0, 0.5))
     # Half of a window of 0.1 s turns at 150 deg/s when its middle is where the ramp begins.
     assert samples.stop == pytest.approx(2000, abs=2)
     assert samples.stop - samples.start == 1000
 
 
 def test_a_jerk_of_less_than_200_ms_is_passed_over():
-    assert zeroing_range(TIMES_S, ramp(1.2, 0.02) + ramp(2.5, 0.5)).stop == pytest.approx(2500, abs=2)
+    assert _zeroing_range(TIMES_S, ramp(1.2, 0.02) + ramp(2.5, 0.5)).stop == pytest.approx(2500, abs=2)
 
 
 def test_range_is_as_long_as_the_run_allows():
-    samples = zeroing_range(TIMES_S, ramp(0.4, 0.5))
+    samples = _zeroing_range(TIMES_S, ramp(0.4, 0.5))
     assert samples.start == 0
     assert samples.stop == pytest.approx(400, abs=2)
 
 
 @pytest.mark.parametrize("slow", [ramp(1.0, 0.1), 0.2 * ramp(1.0, 2.0)])
 def test_a_wheel_that_never_turns_fast_leaves_signals_as_they_are(slow):
-    samples = zeroing_range(TIMES_S, slow)
+    samples = _zeroing_range(TIMES_S, slow)
     assert samples.start == samples.stop
-    assert offset(TIMES_S, samples) == 0.0
+    assert _offset(TIMES_S, samples) == 0.0
 
 
 def test_offset_is_the_mean_over_the_range():
-    assert offset(np.where(TIMES_S < 2.0, 0.3, 1.0), slice(1500, 2500)) == pytest.approx(0.65)
+    assert _offset(np.where(TIMES_S < 2.0, 0.3, 1.0), slice(1500, 2500)) == pytest.approx(0.65)

@@ -229,7 +229,7 @@ def test_the_figures_have_the_values_of_the_metrics() -> None:
 
     def curves(name: str) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
         """Return the first curve of each panel by axle and the beginning of its ordinate's label."""
-        panels = [panel for panel in pictures[name]().panels if isinstance(panel, Panel)]
+        panels = [panel for panel in pictures[name].panels if isinstance(panel, Panel)]
         labels = [
             panels[place - place % 2].y_label.replace("\n", " ").partition(" [")[0] for place in range(len(panels))
         ]

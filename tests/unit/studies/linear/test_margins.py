@@ -13,6 +13,7 @@ from activesteer.controllers import load_controller
 from activesteer.controllers.linear_form import SIGNALS, linear_controller, pulse_responses
 from activesteer.core.signals import ActuatorCommand
 from activesteer.errors import ControllerError, ParameterError, StudyError
+from activesteer.pages import render_page
 from activesteer.scenario import resolve
 from activesteer.simulation.runner import simulate
 from activesteer.studies.linear.linearisation import ACTUATORS, INPUTS, OUTPUTS, LinearCar
@@ -24,12 +25,12 @@ from activesteer.studies.linear.margins import (
     is_stable,
     loop_margins,
     margins_of,
+    margins_page,
     opened,
     opened_at_both,
     round_trip,
     weakest,
     worst_margins,
-    write_margins_page,
 )
 from tests.raising import raises
 from tests.unit.controllers.cars import measured, setup
@@ -257,6 +258,24 @@ def test_what_a_study_varies_and_the_speed_are_given_in_one_place():
         loop_margins(["ars"], speeds_kmh=[100.0], overrides={"speed_kmh": 80.0})
 
 
+def test_a_loop_that_some_cars_of_a_study_lack_has_the_margins_of_the_others():
+    key = "controllers.ars.corrector.proportional_gain_s"
+    study = {"maneuvers": ["step_steer"], "controllers": ["ars"], "factors": {key: {"grid": [0.0, 0.25, 0.5]}}}
+    (worst,) = worst_margins(study, ["ars"], speeds_kmh=[100.0], jobs=1)
+    (alone,) = loop_margins(["ars"], speeds_kmh=[100.0], overrides={key: 0.5})
+    assert (worst.controller, worst.loop, worst.factors) == ("ars", "rear", {key: 0.5})
+    assert worst.margins.disk == alone.margins.disk
+
+
+def test_command_names_the_text_of_the_car_with_the_smallest_margin(tmp_path, capsys):
+    study = tmp_path / "sensors.toml"
+    factors = '[factors]\n"sensors.preset" = { grid = ["ideal", "production"] }\n'
+    study.write_text(f'maneuvers = ["step_steer"]\n{factors}', encoding="utf-8")
+    arguments = ["--study", str(study), "-c", "ars", "--speed-kmh", "100", "--jobs", "1"]
+    assert main(["linearise", "--loop", "controller", *arguments]) == 0
+    assert "sensors.preset = production" in capsys.readouterr().out
+
+
 def test_the_disk_of_a_loop_touches_its_curve():
     loop = integrator(0.05)
     centre, radius = disk(margins_of(loop, FREQUENCIES_RADPS).disk)
@@ -266,13 +285,13 @@ def test_the_disk_of_a_loop_touches_its_curve():
     assert (centre - radius) * (centre + radius) == pytest.approx(1.0)
 
 
-def test_page_of_margins_shows_each_loop_with_its_disk(tmp_path):
+def test_page_of_margins_shows_each_loop_with_its_disk():
     pytest.importorskip("matplotlib")
     loop = integrator(0.05)
     margins = margins_of(loop, FREQUENCIES_RADPS)
     found = [LoopMargins("<b>", "rear", speed, margins, curves=(loop,)) for speed in (60.0, 80.0)]
     many = [LoopMargins("lqr", "rear", 60.0, margins, {"car.mass_kg": 1500.0})]
-    text = write_margins_page([*found, *many], "compact", tmp_path / "new").read_text(encoding="utf-8")
+    text = render_page(margins_page([*found, *many], "compact"))
     assert text.count('<div class="plots"') == 1
     assert "&lt;b&gt;, opened at rear" in text
     assert f"disk margin {margins.disk:.2f}" in text
