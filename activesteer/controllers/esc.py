@@ -23,7 +23,7 @@ from __future__ import annotations
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.core.signals import ActuatorCommand, DriverCommand, Estimate, Measurement
+from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 
 class Esc:
@@ -44,12 +44,13 @@ class Esc:
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
-        desired = self._reference.borne(
-            command.front_steer_demand_rad, now.speed_mps, assumed_friction(p, now), measurement.ay_mps2
-        )
+        friction = now.friction + p.friction_deviations * now.friction_std
+        desired = self._reference.borne(command.front_steer_demand_rad, now.speed_mps, friction, measurement.ay_mps2)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(yaw_rate_desired_radps=desired, estimate=now)
-        moment = self._yaw_inertia_kgm2 * stabilising(p, desired - now.yaw_rate_radps, now)
+        limit_rad = max(p.sideslip_limit_rad, p.sideslip_deviations * now.sideslip_std_rad)
+        demand = stabilising(p, desired - now.yaw_rate_radps, beyond(now.sideslip_rad, limit_rad))
+        moment = self._yaw_inertia_kgm2 * demand
         torques = wheel_torques(moment, now.yaw_rate_radps, self._levers, p.torque_limit_Nm)
         braked = max(torques)  # of the only wheel that brakes
         limited = braked >= p.torque_limit_Nm
@@ -68,16 +69,9 @@ def beyond(value: float, band: float) -> float:
     return value - band if value > band else value + band if value < -band else 0.0
 
 
-def assumed_friction(p: EscParameters, now: Estimate) -> float:
-    """Return the friction that limits the desired yaw rate."""
-    return now.friction + p.friction_deviations * now.friction_std
-
-
-def stabilising(p: EscParameters, error_radps: float, now: Estimate) -> float:
-    """Return the demanded yaw acceleration M_z / J_z for a yaw rate error and the estimated sideslip angle [rad/s2]."""
-    error = beyond(error_radps, p.yaw_rate_band_radps)
-    slide = beyond(now.sideslip_rad, max(p.sideslip_limit_rad, p.sideslip_deviations * now.sideslip_std_rad))
-    return error / p.yaw_rate_time_s + slide / p.sideslip_time_s**2
+def stabilising(p: EscParameters, error_radps: float, slide_rad: float) -> float:
+    """Return the demanded yaw acceleration M_z / J_z, with the sideslip angle beyond its limit [rad/s2]."""
+    return beyond(error_radps, p.yaw_rate_band_radps) / p.yaw_rate_time_s + slide_rad / p.sideslip_time_s**2
 
 
 def brake_levers(setup: ControllerSetup) -> tuple[float, float]:

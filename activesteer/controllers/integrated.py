@@ -56,7 +56,7 @@ import numpy as np
 
 from activesteer.controllers.axle_slopes import slopes
 from activesteer.controllers.corrector import MIN_SPEED_MPS
-from activesteer.controllers.esc import assumed_friction, stabilising
+from activesteer.controllers.esc import beyond, stabilising
 from activesteer.controllers.lqr import Lqr, Turn
 from activesteer.controllers.parameters import ControllerSetup, IntegratedParameters
 from activesteer.controllers.torque_vectoring import SplitTorques
@@ -228,10 +228,10 @@ class Integrated:
 
     def _missing_moment(self, now: Estimate, driver_rad: float, ay_mps2: float, steered_Nm: float) -> float:
         """Return the yaw moment demand that the steering cannot provide within the horizon [Nm]."""
-        borne = self._borne.borne(driver_rad, now.speed_mps, assumed_friction(self._stability, now), ay_mps2)
-        if now.speed_mps < self._stability.least_speed_mps:
+        p, borne = self._stability, self._borne.borne(driver_rad, now.speed_mps, now.friction, ay_mps2)
+        if now.speed_mps < p.least_speed_mps:
             return 0.0
-        demand = stabilising(self._stability, borne - now.yaw_rate_radps, now)
+        demand = stabilising(p, borne - now.yaw_rate_radps, beyond(now.sideslip_rad, p.sideslip_limit_rad))
         # Behind a jump of friction the estimator explains the yaw rate and not the lateral acceleration.
         # Twice: the limits of `confidence` are for the sum over two measured values.
         innovation = 2.0 * self._lqr._estimator.rate_innovation

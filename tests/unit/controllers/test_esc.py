@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from activesteer.controllers import load_controller
-from activesteer.controllers.esc import Esc, brake_levers, stabilising, wheel_torques
+from activesteer.controllers.esc import Esc, brake_levers, wheel_torques
 from activesteer.core.signals import DriverCommand, Estimate
 from activesteer.scenario import resolve
 from activesteer.theory.single_track import SingleTrack
@@ -113,26 +113,32 @@ def test_below_20_kmh_it_rests_and_still_tells_the_desired_yaw_rate(known):
     assert rests.yaw_rate_desired_radps == pytest.approx(turn_radps, rel=0.01)
 
 
+def knowing(known, now):
+    """Return a controller whose estimator knows this."""
+
+    class Known:
+        def step(self, _measurement):
+            return now
+
+    esc = Esc(known)
+    esc._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
+    return esc
+
+
 @pytest.mark.parametrize(("sideslip_deg", "std_deg", "braked"), [(4.0, 0.4, True), (4.0, 1.4, False), (9.0, 1.4, True)])
 def test_only_a_sideslip_angle_that_is_certain_is_braked(known, sideslip_deg, std_deg, braked):
-    """4 deg beyond the limit of 3 deg are no slide if the estimate may be wrong by three times 1.4 deg."""
-    sideslip_rad, std_rad = math.radians(sideslip_deg), math.radians(std_deg)
-    now = Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, 0.0, 0.0, std_rad, 0.0, 0.0)
-    assert (stabilising(known.gains.esc, 0.0, now) > 0.0) == braked
-    assert (stabilising(known.gains.esc, 0.0, now._replace(sideslip_rad=-sideslip_rad)) < 0.0) == braked
+    """4 deg, beyond the limit of 3 deg, are no slide if the estimate may be wrong by three times 1.4 deg."""
+    for side, wheel in ((1.0, 0), (-1.0, 1)):
+        sideslip_rad, std_rad = side * math.radians(sideslip_deg), math.radians(std_deg)
+        now = Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, 0.0, 0.0, std_rad, 0.0, 0.0)
+        torques = knowing(known, now).step(steering(0.0), measured(0.0)).brake_torque_demand_Nm
+        assert [torque > 0.0 for torque in torques] == [braked and index == wheel for index in range(4)]
 
 
 def test_the_desired_yaw_rate_is_limited_by_a_friction_only_as_far_as_it_is_certain(known):
     desired = []
     for std in (0.0, 0.2):
-        now = Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.4, *[0.0] * 4, std)
-
-        class Known:
-            def step(self, _measurement, now=now):
-                return now
-
-        esc = Esc(known)
-        esc._estimator = Known()  # pyright: ignore[reportAttributeAccessIssue]
+        esc = knowing(known, Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.4, *[0.0] * 4, std))
         # The car turns with 4.0 m/s2, which shows a friction of 4.0 / g.
         desired.append(held(esc, steering(0.1), measured(4.0 / SPEED_MPS, SPEED_MPS), 500).yaw_rate_desired_radps)
     assert desired[0] == pytest.approx(0.9 * 4.0 / SPEED_MPS)
