@@ -99,6 +99,13 @@ def test_a_set_whose_run_fails_is_counted_and_not_chosen(tmp_path: Path):
     assert [trial.values for trial in result.trials] == [{RATIO: 0.8}]
 
 
+def test_a_set_that_is_tried_again_is_listed_once(tmp_path: Path):
+    table = {**GAINS, "factors": {WHEEL: {"grid": [10.0, 20.0]}}}
+    (result,) = tune(changed(table, constraints={}), tmp_path, jobs=1, trials=6)
+    assert len(result.trials) == 6
+    assert [trial.values for trial in result.front] == [{WHEEL: 10.0}]
+
+
 @pytest.mark.parametrize("sampler", ["nsga2", "random", "qmc"])
 def test_every_sampler_stays_within_the_ranges(tmp_path: Path, sampler: str):
     (result,) = tune(changed(GAINS, sampler=sampler), tmp_path, jobs=1, trials=3)
