@@ -346,7 +346,8 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         *_unit_problems(table),
     ]
     if problems:
-        raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} errors:", *problems]))
+        head = f"{source.name}: {len(problems)} error{'s' * (len(problems) != 1)}:"
+        raise ParameterError("\n  ".join([head, *problems]))
 
 
 def _contradictions(table: CarTable) -> Iterator[str]:

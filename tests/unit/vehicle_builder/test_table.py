@@ -103,7 +103,9 @@ def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
     ],
 )
 def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: str) -> None:
-    assert hint in problems(changed(COMPACT, tmp_path, (old, new)))
+    told = problems(changed(COMPACT, tmp_path, (old, new)))
+    assert hint in told
+    assert ": 1 error: " in told
 
 
 @pytest.mark.parametrize(
