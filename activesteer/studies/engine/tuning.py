@@ -238,8 +238,11 @@ class _Search:
         lines = {key: value for key, value in (study.tune or {}).items() if key != "trials"}
         text = f"# {self.plan.digest}\n{replace(study, tune=lines).to_toml()}"
         path = self.folder / f"{TABLE}.toml"
-        if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
-            raise StudyError(f"{self.folder} holds another search; use a new folder", value=self.folder)
+        held = path.read_text(encoding="utf-8", errors="replace") if path.exists() else text
+        if held != text:
+            same = held.partition("\n")[2] == text.partition("\n")[2]
+            what = "this search with other versions of its files or of activesteer" if same else "another search"
+            raise StudyError(f"{self.folder} holds {what}; use a new folder", value=self.folder)
         write_text(path, text, StudyError)
 
     def stored(self) -> Any:
