@@ -240,14 +240,16 @@ def faults_text(faults: Any) -> str:
 def _fault_text(fault: Mapping[str, Any]) -> str:
     said = f"{fault.get('part', '?')}:{fault.get('kind', '?')}"
     for key, value in fault.items():
-        if key == "side":
+        if key == "side" and value:
             said += f"={value}"
         elif (key == "delay_s" or key.startswith("size_")) and isinstance(value, int | float):
             unit = key.rpartition("_")[2]
             radians = unit.startswith("rad")
             said += f"={math.degrees(value) if radians else value:.6g}{unit.replace('rad', 'deg')}"
-    start_s, end_s = fault.get("start_s"), fault.get("end_s")
-    return said + (f"@{start_s:g}" if start_s is not None else "") + (f"-{end_s:g}" if end_s is not None else "")
+    for mark, time_s in (("@", fault.get("start_s")), ("-", fault.get("end_s"))):
+        if time_s is not None:
+            said += f"{mark}{time_s:g}" if isinstance(time_s, int | float) else f"{mark}{shown(time_s)}"
+    return said
 
 
 def fault_words(fault: Mapping[str, Any]) -> str:
