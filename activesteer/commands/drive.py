@@ -192,6 +192,7 @@ def _watch(options: argparse.Namespace) -> None:
 def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Namespace) -> Any:
     """Drive and record one controller, and return the recording."""
     from activesteer.coupling.udp import UdpLink, UdpPort
+    from activesteer.recording.contents import events_of
     from activesteer.simulation.runner import run_scenario
 
     name, quiet = f"{scenario.maneuver.name} {controller.label}", options.json
@@ -212,6 +213,8 @@ def _driven(scenario: Any, controller: Plugin, path: Path, options: argparse.Nam
     lines = [] if quiet else [*lines, str(path)]
     if problem := metadata.get("metrics_error"):
         lines.append(f"no metrics: {problem}")
+    if not quiet:
+        lines += [event.what for event in events_of(metadata) if event.kind == "note"]
     for line in lines:
         print(f"{name}: {line}", file=sys.stderr)
     return recording

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands import arguments, terminal
+from activesteer.config.faults import faults_text
 from activesteer.core.files import atomic_write, shown_path
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 
@@ -69,7 +70,10 @@ def _info(options: argparse.Namespace) -> None:
     print(terminal.entry("driver: ", _driver(metadata.get("driver", "?"))))
     for key in ("overrides", "versions"):
         if metadata.get(key):
-            print(terminal.entry(f"{key}: ", ", ".join(f"{name} {value}" for name, value in metadata[key].items())))
+            said = (
+                f"{name} {faults_text(value) if name == 'fault' else value}" for name, value in metadata[key].items()
+            )
+            print(terminal.entry(f"{key}: ", ", ".join(said)))
     for event in events_of(metadata):
         print(terminal.entry(f"at {event.time_s:.3f} s: ", f"{event.kind} {event.what}"))
     if not metadata.get("complete", True):

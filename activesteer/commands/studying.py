@@ -411,7 +411,12 @@ def _controller_loop(options: argparse.Namespace) -> None:
     rows = [margins.to_json() for margins in found]
     if not rows:
         raise ParameterError("none of these controllers uses a measurement, so there is no loop", key="-c")
-    lines = [*terminal.table_lines(rows, _CONTROLLER_COLUMNS)]
+    shown = [
+        {key: each.margins.absent if isinstance(value, float) and math.isnan(value) else value
+         for key, value in row.items()}
+        for each, row in zip(found, rows, strict=True)
+    ]  # fmt: skip
+    lines = [*terminal.table_lines(shown, _CONTROLLER_COLUMNS)]
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
         shown = {key: value if isinstance(value, str) else f"{value:.3g}" for key, value in least["factors"].items()}

@@ -149,9 +149,10 @@ def _test(options: argparse.Namespace) -> bool:
             write_json(options.output / f"{name}.json", values, ParameterError),
         ]
     lines = [result.standard.title]
+    width = min(max([12, *map(len, result.findings)]), 24)
     for controller, found in result.findings.items():
         word = {True: "passed", False: "FAILED", None: ""}[found.passed]
-        lines.append(terminal.entry(terminal.coloured(f"{controller:12} {word:7}"), found.summary, 20))
+        lines.append(terminal.entry(terminal.coloured(f"{controller:{width}} {word:7}"), found.summary, width + 8))
     terminal.tell(options, values, lines, files, "written")
     return bool(result.failed)
 

@@ -84,7 +84,8 @@ def csv_columns(path: Path) -> list[Column]:
     cells = _cells(head[first], separator)
     comma = any(_COMMA.fullmatch(cell) for line in lines[first : first + 50] for cell in _cells(line, separator))
     names, units = _header(head[:first], separator, len(cells), path)
-    body = "\n".join(line for line in lines[first:] if line.strip())
+    filled = [number for number in range(first, len(lines)) if lines[number].strip()]
+    body = "\n".join(lines[number] for number in filled)
     if separator == " ":
         body = re.sub(r"^[ \t]+|[ \t]+$", "", re.sub(r"[ \t]+", " ", body), flags=re.MULTILINE)
     places = [f"{place}" for place in range(len(names))]
@@ -109,9 +110,11 @@ def csv_columns(path: Path) -> list[Column]:
         texts = column.to_pylist()
         times_s = _clock_s(texts)
         if times_s is None:
-            text = next((text for text in texts if text and not _NUMBER.fullmatch(text.strip())), "")
-            problem = f"{shown(text)} is not a number" if text else "decimal points and commas are mixed"
-            raise RecordingError(f"column {shown(name)} holds no numbers: {problem}", file=path.name)
+            row = next((row for row, text in enumerate(texts) if text and not _NUMBER.fullmatch(text.strip())), None)
+            if row is None:
+                raise RecordingError(f"column {shown(name)} mixes decimal points and commas", file=path.name)
+            problem = f"column {shown(name)} holds {shown(texts[row])}, which is not a number"
+            raise RecordingError(f"{problem}; leave a missing cell empty", file=path.name, line=filled[row] + 1)
         return times_s, None
 
     columns = zip(places, names, units, strict=True)

@@ -38,6 +38,8 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
         return kind.fail(text, problem, value, allowed)
 
     form = _FORM.fullmatch(text)
+    if form is None and text.endswith(".py"):
+        raise kind.error(f"{shown(text)} needs the name of its class, as in {kind.example}", value=text)
     if form is None:
         hint = nearest_names(text, kind.names())
         raise kind.error(

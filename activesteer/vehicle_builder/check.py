@@ -104,7 +104,8 @@ class CheckReport:
             if finding.advice:
                 lines += _WRAPPED.wrap(f"           -> {finding.advice}")
         errors, warnings = self.count("error"), self.count("warning")
-        return "\n".join([*lines, "", f"{self.vehicle}: {errors} errors, {warnings} warnings, {self.count('ok')} ok"])
+        told = f"{errors} error{'s' * (errors != 1)}, {warnings} warning{'s' * (warnings != 1)}"
+        return "\n".join([*lines, "", f"{self.vehicle}: {told}, {self.count('ok')} ok"])
 
 
 @dataclass(frozen=True)

@@ -257,7 +257,10 @@ def _read_csv(path: Path) -> tuple[dict[str, Any], Source]:
         if cells[0].lower() in ("name", "key") and not raw:
             continue
         if len(cells) < 2:
-            raise ParameterError("has no value", file=path.name, line=number, key=cells[0])
+            why = "has no value; a line of a .csv file is KEY, VALUE"
+            if "=" in cells[0]:
+                why += ", and a table with lines KEY = VALUE needs the ending .toml"
+            raise ParameterError(why, file=path.name, line=number, key=cells[0])
         keys = cells[0].split(".")
         if len(keys) == 2 and keys[0] in ("front", "rear") and keys[1] not in axle_keys:
             keys = [keys[0], "points", keys[1]]
@@ -343,7 +346,8 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         *_unit_problems(table),
     ]
     if problems:
-        raise ParameterError("\n  ".join([f"{source.name}: {len(problems)} errors:", *problems]))
+        head = f"{source.name}: {len(problems)} error{'s' * (len(problems) != 1)}:"
+        raise ParameterError("\n  ".join([head, *problems]))
 
 
 def _contradictions(table: CarTable) -> Iterator[str]:

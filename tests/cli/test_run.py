@@ -45,6 +45,14 @@ def test_each_controller_makes_a_file_and_a_column(call, tmp_path):
         assert f"step_steer {name}: out/step_steer-{name}.mcap" in told.err
 
 
+def test_a_run_notes_an_actuator_that_is_slower_than_its_controller_needs(call):
+    arguments = ("run", "step_steer", "-c", "none", "-c", "ars", *STEP, "--set", "duration_s=0.3")
+    told = call(*arguments, "--set", "rear_actuator.preset=screw_3deg", "-o", "slow")
+    assert "step_steer ars: rear steering turns the wheels at 12 deg/s, but ars needs" in told.err
+    assert "step_steer none: rear steering" not in told.err
+    assert "needs" not in call(*arguments, "-o", "servo").err
+
+
 def test_json_is_nothing_but_json(call):
     told = call("run", "step_steer", "-c", "none", "-c", "ars", *EVALUATED, "--json")
     assert told.status == 0

@@ -241,6 +241,17 @@ FIELDS = """() => {
 
 
 @pytest.mark.slow
+def test_a_choice_with_a_long_name_is_no_wider_than_a_phone(shown, tmp_path):
+    page = shown(of_study(tmp_path), **PHONE)
+    for select in page.locator("select").all():
+        select.evaluate("(select) => { select.options[0].textContent = 'a long name '.repeat(9); }")
+        box = select.bounding_box()
+        assert box
+        assert 300.0 < box["x"] + box["width"] <= 390.0
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+@pytest.mark.slow
 def test_the_values_of_a_map_stand_in_the_middle_of_their_fields(shown, tmp_path):
     page = shown(of_study(tmp_path), **PHONE)
     fields = page.evaluate(FIELDS)

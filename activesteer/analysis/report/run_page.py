@@ -22,6 +22,7 @@ from activesteer.analysis.source import entry
 from activesteer.analysis.step_response import NOT_FOLLOWED, follows_steering
 from activesteer.analysis.tables import Cell, Change, difference_text, is_near, notes, number, significance
 from activesteer.config import leaves
+from activesteer.config.faults import faults_text
 from activesteer.core.conventions import RunLook
 from activesteer.core.files import write_text
 from activesteer.core.metric_table import LANE_OVERSTEP, Better, recorded_metric
@@ -394,8 +395,11 @@ def _changed(group: Group) -> list[str]:
 def changed_parameters(run: ReportedRun) -> str:
     """Describe the overrides of a run with their values and keys, empty without overrides."""
     changed: Any = run.recording.metadata.get("overrides")
-    labels = {key: parameter_label(key) for key in changed} if isinstance(changed, Mapping) else {}
-    return ", ".join(f"{words} {changed[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())
+    if not isinstance(changed, Mapping):
+        return ""
+    values = {key: faults_text(value) if key == "fault" else value for key, value in changed.items()}
+    labels = {key: parameter_label(key) for key in values}
+    return ", ".join(f"{words} {values[key]} {unit}".rstrip() + f" ({key})" for key, (words, unit) in labels.items())
 
 
 def metric_rows(group: Group) -> list[list[Text]]:

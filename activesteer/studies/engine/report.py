@@ -358,7 +358,9 @@ def _front(found: Tuning) -> Panel:
         "statements that hold": "more is better",
         "set": "in the order of the search",
     }
-    x_title, y_title = (f"{name} [-], {better.get(name, 'smaller is better')}" for name in (x, y))
+    # An objective is an expression in SI units, whose unit is unknown here.
+    unit = {name: "" if name in found.trials[0].objectives else " [-]" for name in (x, y)}
+    x_title, y_title = (f"{name}{unit[name]}, {better.get(name, 'smaller is better')}" for name in (x, y))
     return Panel(x_title, y_title, curves)
 
 

@@ -234,8 +234,11 @@ class _Search:
         lines = {key: value for key, value in (study.tune or {}).items() if key != "trials"}
         text = f"# {self.plan.digest}\n{replace(study, tune=lines).to_toml()}"
         path = self.folder / f"{TABLE}.toml"
-        if path.exists() and path.read_text(encoding="utf-8", errors="replace") != text:
-            raise StudyError(f"{self.folder} holds another search; use a new folder", value=self.folder)
+        held = path.read_text(encoding="utf-8", errors="replace") if path.exists() else text
+        if held != text:
+            same = held.partition("\n")[2] == text.partition("\n")[2]
+            what = "this search with other versions of its files or of activesteer" if same else "another search"
+            raise StudyError(f"{self.folder} holds {what}; use a new folder", value=self.folder)
         write_text(path, text, StudyError)
 
     def stored(self) -> Any:
@@ -347,7 +350,7 @@ class _Search:
         done = [trial for trial in made.get_trials(deepcopy=False) if trial.state.is_finished()]
         trials = [self._trial(trial) for trial in done if trial.state == states.COMPLETE]
         best, study = {trial.number for trial in made.best_trials}, self.plan.study
-        front = [trial for trial in trials if trial.number in best]
+        front = _different([trial for trial in trials if trial.number in best])
         found = Tuning(self.goal, len(done), len(done) * len(self._places), trials, front)
         if self.goal is Goal.MINIMISE:
             return replace(found, without_effect=without_effect(self.plan, self._seen))
@@ -374,6 +377,15 @@ class _Search:
             trial.user_attrs["constraints"],
             math.nan if self.judge.prior is None else self.judge.prior.implausibility(trial.params),
         )
+
+
+def _different(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the first trial of every set of values, since a sampler may try the values of grids again."""
+    first: list[Trial] = []
+    for one in trials:
+        if all(one.values != other.values for other in first):
+            first.append(one)
+    return first
 
 
 def _plausible(trials: Sequence[Trial]) -> list[Trial]:

@@ -86,6 +86,11 @@ class Margins:
     delay_s: float  # smallest delay that makes it marginal [s]
     disk: float  # alpha of the balanced disk [-]; 0 if the closed loop is unstable
 
+    @property
+    def absent(self) -> str:
+        """Text for a margin that does not exist: no change of this kind makes the loop marginal, or it is unstable."""
+        return "no limit" if self.disk else "unstable"
+
 
 def margins_of(loop: Response, frequencies_radps: Array, stable: bool = True) -> Margins:
     """Return the margins of a loop from its frequency response."""
@@ -419,7 +424,7 @@ def _table(loops: Sequence[LoopMargins]) -> Table:
     for each in loops:
         margins = each.margins
         values = (margins.gain_dB, math.degrees(margins.phase_rad), 1e3 * margins.delay_s, margins.disk)
-        numbers = [f"{value:.{digits}f}" if math.isfinite(value) else "none"
+        numbers = [f"{value:.{digits}f}" if math.isfinite(value) else margins.absent
                    for value, digits in zip(values, (1, 1, 1, 2), strict=True)]  # fmt: skip
         changed = ", ".join(f"{key} = {value}" for key, value in each.factors.items())
         rows.append([f"{_name(each)}, {each.speed_kmh:g} km/h", *numbers, changed][: len(heads)])

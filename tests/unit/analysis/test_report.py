@@ -247,6 +247,9 @@ def test_page_says_at_its_top_what_was_lost_and_what_was_driven_otherwise():
     top = Page(report_page(runs, date(2026, 1, 2))).words.partition("Metrics")[0]
     assert "Driven with speed 95 km/h (maneuver.speed_kmh) in place" in top
     assert better in top
+    for run in runs.values():
+        run.metadata["overrides"] = {"fault": [{"part": "rear", "kind": "stuck", "start_s": 2.0}]}
+    assert "rear:stuck@2 (fault) in place" in Page(report_page(runs, date(2026, 1, 2))).words
 
 
 def test_signals_of_a_standing_car_that_are_zero_are_named_but_not_drawn():

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
-from activesteer.config.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table
+from activesteer.config.faults import ACTUATORS, KINDS, SENSORS, Fault, fault_table, faults_text
 from activesteer.errors import ManeuverError, ParameterError
 from activesteer.scenario import resolve
 from tests.raising import raises
@@ -110,6 +111,29 @@ def test_one_part_has_one_fault_at_a_time() -> None:
 def test_a_name_has_its_time_unless_it_begins_now_and_has_no_end(text: str, now_s: float, name: str) -> None:
     [fault] = faults_of(fault_table(text))
     assert fault.name_at(now_s) == name
+
+
+@pytest.mark.parametrize(
+    ("faults", "text"),
+    [
+        ([fault_table("rear:stuck@2")], "rear:stuck@2"),
+        (
+            [{"part": "rear", "kind": "offset", "size_rad": math.radians(1.0), "start_s": 2.0, "end_s": 3.5}],
+            "rear:offset=1deg@2-3.5",
+        ),
+        (
+            (fault_table("rear:runaway=left@2-2.05"), "yaw_rate_sensor:delayed=0.1s@1"),
+            "rear:runaway=left@2-2.05 yaw_rate_sensor:delayed=0.1s@1",
+        ),
+        (fault_table("yaw_rate_sensor:offset=2degps@1"), "yaw_rate_sensor:offset=2degps@1"),
+        ([], "none"),
+        (3, "3"),
+        ([None], "[None]"),
+        ([{"part": "rear", "start_s": "soon", "side": None}], "rear:?@'soon'"),
+    ],
+)
+def test_faults_of_an_override_are_told_as_on_the_command_line(faults: Any, text: str) -> None:
+    assert faults_text(faults) == text
 
 
 def test_every_kind_says_what_it_does() -> None:

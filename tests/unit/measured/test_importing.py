@@ -302,7 +302,16 @@ def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
     [
         ("a.csv", b"", "no line of numbers"),
         ("a.csv", b"\x00\xff" * 100, "no line of numbers"),
-        ("a.csv", b"time,yaw_rate_radps\n0,0\n0.1,x\n", "'x'"),
+        (
+            "a.csv",
+            b"time,yaw_rate_radps\n0,0\n\n0.1,\n0.2,x\n",
+            "a.csv, line 5: column 'yaw_rate_radps' holds 'x', which is not a number; leave a missing cell empty",
+        ),
+        (
+            "a.csv",
+            b"time;yaw_rate_radps\n0,1;0\n0,2;0.1\n",
+            "a.csv: column 'yaw_rate_radps' mixes decimal points and commas",
+        ),
         ("a.csv", b"time,yaw_rate_radps\n0,0\n1,0\n0.5,0\n", "goes backwards, from 1 to 0.5 s"),
         ("a.csv", b"time,yaw_rate_radps\n0,0\n", "fewer than two samples"),
         ("a.csv", b"time,yaw_rate_radps[bar]\n0,0\n1,1\n", "yaw_rate_radps"),

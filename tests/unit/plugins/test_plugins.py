@@ -192,6 +192,12 @@ def test_what_is_no_file_is_answered(tmp_path, make):
         controller_spec(f"{tmp_path}/mine.py:Mine")
 
 
+def test_a_file_without_its_class_is_answered_with_the_form():
+    with raises(ControllerError, value="mine.py") as told:
+        controller_spec("mine.py")
+    assert str(told.value) == "'mine.py' needs the name of its class, as in my_file.py:MyController"
+
+
 @pytest.mark.parametrize(
     "name", ["~nobody_of_this_name/mine.py:Mine", "x" * 300 + ".py:Mine", "\udcff\0.py:Mine", "x:" + "y" * 9999, "x:\n"]
 )

@@ -13,6 +13,7 @@ import pytest
 
 from activesteer.errors import ParameterError
 from activesteer.vehicle_builder import CheckReport, check_vehicle, new_vehicle
+from activesteer.vehicle_builder.check import Finding
 from tests.raising import raises
 from tests.unit.vehicle_builder.tables import COMPACT, WISHBONE, changed
 
@@ -22,6 +23,19 @@ Damage = Callable[..., CheckReport]
 @functools.cache
 def compact() -> CheckReport:
     return check_vehicle("compact")
+
+
+@pytest.mark.parametrize(
+    ("levels", "told"),
+    [
+        (("ok",), "0 errors, 0 warnings, 1 ok"),
+        (("error", "warning", "ok"), "1 error, 1 warning, 1 ok"),
+        (("error", "error", "warning", "warning"), "2 errors, 2 warnings, 0 ok"),
+    ],
+)
+def test_the_last_line_counts_the_findings(levels, told):
+    report = CheckReport("mine", tuple(Finding("parts", "one", level, "1") for level in levels))
+    assert report.table().splitlines()[-1] == f"mine: {told}"
 
 
 @pytest.fixture(scope="module")

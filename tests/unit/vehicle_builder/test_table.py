@@ -60,6 +60,19 @@ def test_points_in_millimetres_where_metres_are_stated(tmp_path: Path) -> None:
     assert 'are all in mm? then write units = "mm"' in told
 
 
+def test_a_toml_table_with_the_ending_of_a_csv_file_is_told_its_ending(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text('# my car\nunits = "mm"\n')
+    with raises(ParameterError, file="mine.csv", line=2) as caught:
+        read_table(path)
+    assert "needs the ending .toml" in str(caught.value)
+    path.write_text("units\n")
+    with raises(ParameterError, file="mine.csv", line=1, key="units") as caught:
+        read_table(path)
+    assert "a line of a .csv file is KEY, VALUE" in str(caught.value)
+    assert ".toml" not in str(caught.value)
+
+
 def test_one_point_in_millimetres_is_named(tmp_path: Path) -> None:
     path = tmp_path / "one.csv"
     text = WISHBONE.read_text().replace("units, mm", "units, m")
@@ -90,7 +103,9 @@ def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
     ],
 )
 def test_other_units_are_recognised(tmp_path: Path, old: str, new: str, hint: str) -> None:
-    assert hint in problems(changed(COMPACT, tmp_path, (old, new)))
+    told = problems(changed(COMPACT, tmp_path, (old, new)))
+    assert hint in told
+    assert ": 1 error: " in told
 
 
 @pytest.mark.parametrize(

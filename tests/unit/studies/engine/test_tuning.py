@@ -85,6 +85,18 @@ def test_a_search_is_resumed_from_all_whole_lines_and_another_is_refused(tmp_pat
         tune({**table, "seed": 9}, tmp_path, jobs=1)
 
 
+def test_a_search_whose_files_have_changed_is_not_resumed_and_says_so(tmp_path: Path):
+    tune(GAINS, tmp_path, jobs=1, trials=1)
+    told = tmp_path / "tune.toml"
+    told.write_text("# digest of other files\n" + told.read_text().partition("\n")[2])
+    with raises(StudyError, value=tmp_path) as caught:
+        tune(GAINS, tmp_path, jobs=1, trials=2)
+    assert "holds this search with other versions of its files or of activesteer" in str(caught.value)
+    with raises(StudyError, value=tmp_path) as caught:
+        tune({**GAINS, "seed": 9}, tmp_path, jobs=1, trials=2)
+    assert "holds another search" in str(caught.value)
+
+
 def test_two_searches_do_not_work_in_one_folder(tmp_path: Path):
     with locked(tmp_path / LOCK), raises(StudyError, cause=BlockingIOError, value=tmp_path):
         tune(GAINS, tmp_path, jobs=1)
@@ -97,6 +109,13 @@ def test_a_set_whose_run_fails_is_counted_and_not_chosen(tmp_path: Path):
     (result,) = tune(changed(table, sampler="grid", constraints={}), tmp_path / "t", jobs=1)
     assert (result.done, result.failed) == (2, 1)
     assert [trial.values for trial in result.trials] == [{RATIO: 0.8}]
+
+
+def test_a_set_that_is_tried_again_is_listed_once(tmp_path: Path):
+    table = {**GAINS, "factors": {WHEEL: {"grid": [10.0, 20.0]}}}
+    (result,) = tune(changed(table, constraints={}), tmp_path, jobs=1, trials=6)
+    assert len(result.trials) == 6
+    assert [trial.values for trial in result.front] == [{WHEEL: 10.0}]
 
 
 @pytest.mark.parametrize("sampler", ["nsga2", "random", "qmc"])

@@ -241,6 +241,22 @@ def test_worst_margins_are_those_of_single_cars_that_the_controller_does_not_kno
     assert found.factors == cars[1]
 
 
+def test_command_and_page_tell_an_unlimited_margin_from_an_unstable_loop(tmp_path, capsys):
+    code = "class Damper:\n    def __init__(self, gain_s=0.02):\n        self.gain_s = gain_s\n\n"
+    code += "    def step(self, command, measurement):\n"
+    code += "        return ActuatorCommand(rear_steer_demand_rad=self.gain_s * measurement.yaw_rate_radps)\n"
+    file = tmp_path / "damper.py"
+    file.write_text(f"from activesteer import ActuatorCommand\n\n\n{code}")
+    for gain_s, word, other in ((0.02, "no limit", "unstable"), (3.0, "unstable", "no limit")):
+        arguments = ["-c", f"{file}:Damper?gain_s={gain_s}", "--speed-kmh", "80", "-o", str(tmp_path)]
+        assert main(["linearise", "--loop", "controller", *arguments]) == 0
+        table = capsys.readouterr().out.partition("page: ")[0]
+        assert word in table
+        assert other not in table
+        assert "nan" not in table
+        assert word in (tmp_path / "margins.html").read_text()
+
+
 def test_a_loop_that_is_unstable_in_one_car_has_no_margins():
     unstable = margins_of(integrator(), FREQUENCIES_RADPS, stable=False)
     assert weakest([margins_of(integrator(0.05), FREQUENCIES_RADPS), unstable]) is unstable
