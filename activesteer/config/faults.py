@@ -13,7 +13,7 @@ from activesteer.config import Range, Source, build
 from activesteer.core.conventions import CORNERS
 from activesteer.core.signals import Measurement, numbers_of
 from activesteer.core.units import display_unit
-from activesteer.errors import ManeuverError, ParameterError, nearest_names, shown
+from activesteer.errors import ActiveSteerError, ManeuverError, ParameterError, nearest_names, shown
 
 
 class Actuator(NamedTuple):
@@ -232,24 +232,11 @@ def fault_table(text: str, start_s: float | None = None) -> dict[str, Any]:
 def faults_text(faults: Any) -> str:
     """Return the faults of an override as written on the command line, separated by blanks."""
     each = [faults] if isinstance(faults, str | Mapping) else faults
-    if not isinstance(each, list | tuple) or not all(isinstance(one, str | Mapping) for one in each):
+    try:
+        names = [one if isinstance(one, str) else build(Fault, dict(one), Source("")).name_at(-1.0) for one in each]
+    except (ActiveSteerError, TypeError, ValueError):  # of a recording that is not from this version
         return str(faults)
-    return " ".join(one if isinstance(one, str) else _fault_text(one) for one in each) or "none"
-
-
-def _fault_text(fault: Mapping[str, Any]) -> str:
-    said = f"{fault.get('part', '?')}:{fault.get('kind', '?')}"
-    for key, value in fault.items():
-        if key == "side" and value:
-            said += f"={value}"
-        elif (key == "delay_s" or key.startswith("size_")) and isinstance(value, int | float):
-            unit = key.rpartition("_")[2]
-            radians = unit.startswith("rad")
-            said += f"={math.degrees(value) if radians else value:.6g}{unit.replace('rad', 'deg')}"
-    for mark, time_s in (("@", fault.get("start_s")), ("-", fault.get("end_s"))):
-        if time_s is not None:
-            said += f"{mark}{time_s:g}" if isinstance(time_s, int | float) else f"{mark}{shown(time_s)}"
-    return said
+    return " ".join(names) or "none"
 
 
 def fault_words(fault: Mapping[str, Any]) -> str:

@@ -129,7 +129,7 @@ def test_a_name_has_its_time_unless_it_begins_now_and_has_no_end(text: str, now_
         ([], "none"),
         (3, "3"),
         ([None], "[None]"),
-        ([{"part": "rear", "start_s": "soon", "side": None}], "rear:?@'soon'"),
+        ([{"part": "rear", "start_s": "soon"}], "[{'part': 'rear', 'start_s': 'soon'}]"),
     ],
 )
 def test_faults_of_an_override_are_told_as_on_the_command_line(faults: Any, text: str) -> None:
