@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from activesteer.commands import arguments, terminal
-from activesteer.config.faults import faults_text
 from activesteer.core.files import atomic_write, shown_path
 from activesteer.errors import ParameterError, PlaybackError, RecordingError, shown
 
@@ -37,6 +36,7 @@ def _info(options: argparse.Namespace) -> None:
     from activesteer.analysis.harm import failures, kept
     from activesteer.analysis.path_following import judged_metrics
     from activesteer.analysis.tables import comparison
+    from activesteer.config.faults import faults_text
     from activesteer.recording import Recording
     from activesteer.recording.contents import events_of
 

@@ -38,15 +38,12 @@ def from_file(text: str, kind: Kind) -> tuple[Any, dict[str, Any], dict[str, byt
         return kind.fail(text, problem, value, allowed)
 
     form = _FORM.fullmatch(text)
-    if form is None and text.endswith(".py"):
-        raise kind.error(f"{shown(text)} needs the name of its class, as in {kind.example}", value=text)
     if form is None:
-        hint = nearest_names(text, kind.names())
-        raise kind.error(
-            f"there is no {kind.word} {shown(text)}; {hint} (give your own as {kind.example})",
-            value=text,
-            allowed=tuple(kind.names()),
-        )
+        known = nearest_names(text, kind.names())
+        problem = f"there is no {kind.word} {shown(text)}; {known} (give your own as {kind.example})"
+        if text.endswith(".py"):
+            problem = f"{shown(text)} needs the name of its class, as in {kind.example}"
+        raise kind.error(problem, value=text, allowed=tuple(kind.names()))
     if not form["name"].isidentifier():
         raise fail(f"{shown(form['name'])} cannot be the name of a class; give your own as {kind.example}")
     path = user_path(form["path"], kind.error)
