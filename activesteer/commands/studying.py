@@ -419,8 +419,8 @@ def _controller_loop(options: argparse.Namespace) -> None:
     lines = [*terminal.table_lines(shown, _CONTROLLER_COLUMNS)]
     if options.study:
         least = min(rows, key=lambda row: row["disk_margin"])
-        shown = {key: value if isinstance(value, str) else f"{value:.3g}" for key, value in least["factors"].items()}
-        changed = ", ".join(f"{key} = {value}" for key, value in shown.items())
+        words = {key: value if isinstance(value, str) else f"{value:.3g}" for key, value in least["factors"].items()}
+        changed = ", ".join(f"{key} = {value}" for key, value in words.items())
         where = f"{least['controller']}, {least['loop']}, {least['speed_kmh']:.0f} km/h"
         lines.append(f"smallest disk margin {least['disk_margin']:.3g}: {where}, with {changed}")
     pages = []

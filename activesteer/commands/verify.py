@@ -73,7 +73,7 @@ def _reproduce(options: argparse.Namespace) -> int:
     if not options.all:
         lines.append("--all prints every claim with its numbers")
     if "paper" not in settings and options.vehicle == "compact":
-        lines.append("--setting paper drives the most plausible values that the paper does not give")
+        lines.append("--setting paper uses the most plausible values where the paper gives none")
     values = tables[0] if len(tables) == 1 else {"settings": tables}
     about = {"figures": list(map(str, figures)), "report": None if report is None else str(report)}
     terminal.tell(options, values | about | {"exit_status": status}, lines)

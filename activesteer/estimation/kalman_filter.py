@@ -296,7 +296,7 @@ def _take_in(state, covariance, row, error, variance):
 
 @compiled
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
-    """Process a measurement, and return the normalised squared errors (chi-square): both values, yaw rate only."""
+    """Process a measurement, and return its normalised squared error and that of the yaw rate alone (chi-square)."""
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
