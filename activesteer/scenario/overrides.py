@@ -138,7 +138,8 @@ def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | 
         arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
         for key, value in arrays.items():
             if len(value) != n:
-                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
+                needed = f"one for each of {n} cars is needed in an array, and a list is one value for all"
+                raise ParameterError(f"has {len(value)} values; {needed}", key=key)
         return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
     if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
         raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")

@@ -393,5 +393,6 @@ def _named(car: int) -> Iterator[None]:
     try:
         yield
     except ActiveSteerError as error:
-        error.add_note(f"car {car} of the batch")
+        listed = error.overridden and isinstance(error.value, (list, tuple))
+        error.add_note(f"car {car} of the batch" + ("; an array has a value for each car, a list is one for all" * listed))
         raise
