@@ -47,7 +47,8 @@ def _info(options: argparse.Namespace) -> None:
         if options.recover.exists() and options.recover.samefile(options.file):
             raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
         recording.save(options.recover)
-        span = f"{len(time_s)} steps up to {time_s[-1]:.3f} s" if len(time_s) else "no steps"
+        none = f"metadata and attachments only; no rows can be read in {shown_path(options.file)}"
+        span = f"{len(time_s)} steps up to {time_s[-1]:.3f} s" if len(time_s) else none
         print(f"{options.recover}: {span}")
         return
     if options.json:
