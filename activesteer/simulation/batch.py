@@ -394,5 +394,6 @@ def _named(car: int) -> Iterator[None]:
         yield
     except ActiveSteerError as error:
         listed = error.overridden and isinstance(error.value, (list, tuple))
-        error.add_note(f"car {car} of the batch" + ("; an array has a value for each car, a list is one for all" * listed))
+        rule = "; an array has a value for each car, a list is one for all" * listed
+        error.add_note(f"car {car} of the batch{rule}")
         raise
