@@ -363,12 +363,12 @@ def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> P
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
     """Return a name for each run: its controller, or its file if controllers repeat."""
-    # A user's controller is named by file and class; the class is enough.
-    controllers = [
-        str(run.metadata.get("controller", "run")).rpartition(":")[2]
-        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
-        for run in recordings
-    ]
+    controllers = []
+    for run in recordings:
+        # A user's controller is named by file and class; the class is enough. A parameter may contain a colon too.
+        name, mark, parameters = str(run.metadata.get("controller", "run")).partition("?")
+        uses_truth = "+truth" if run.metadata.get("controller_uses_truth") else ""
+        controllers.append(name.rpartition(":")[2] + mark + parameters + uses_truth)
     if len(set(controllers)) == len(controllers):
         return controllers
     paths = [str(source).removesuffix(".mcap") for source in sources]
