@@ -35,6 +35,8 @@ SMOOTHING_S: Final = 0.5
 """Window of the moving average for the limits [s]."""
 MIN_SPEED_MPS: Final = 1.0
 """Least speed at which curvature is evaluated [m/s]."""
+CONSTANT_SHARE: Final = 0.02
+"""Relative change of a speed that counts as constant: 2 km/h at 100 km/h. Chosen."""
 
 
 class CarGeometry(NamedTuple):
@@ -98,7 +100,7 @@ def evaluate(recording: RecordingLike, car: CarGeometry | None = None) -> dict[s
         return _line(ay[fit], values[fit])[0]
 
     understeer, offset = _line(ay[fit], (steer - car.wheelbase_m * curvature)[fit])
-    constant_speed = float(np.ptp(speed[fit])) < 0.02 * float(speed[fit].mean())
+    constant_speed = float(np.ptp(speed[fit])) < CONSTANT_SHARE * float(speed[fit].mean())
     expected = car.wheelbase_m * curvature + understeer * ay + offset
     departed = rising & (np.abs(_moving_average(steer - expected, step_s)) > DEPARTURE * np.abs(expected))
     departed &= smoothed > FIT_MPS2[1]

@@ -64,6 +64,20 @@ def general_metrics(recording: RecordingLike) -> dict[str, float]:
     return {name: value for part in all_parts for name, value in part.items()}
 
 
+def speed_note(recording: RecordingLike) -> str:
+    """Return a note on a response that is not at the demanded speed, empty otherwise."""
+    if evaluated_kind(recording) not in ("step_steer", "sine_sweep", "random_steer") or stands(recording):
+        return ""
+    speed_mps, demanded_mps = recording["speed_mps"], recording.metadata["maneuver"]["speed_mps"]
+    off = float(speed_mps[np.argmax(np.abs(speed_mps - demanded_mps))])
+    if abs(off - demanded_mps) <= handling.CONSTANT_SHARE * abs(demanded_mps):
+        return ""
+    return (
+        f"the car drives {3.6 * off:.4g} km/h where {3.6 * demanded_mps:.4g} km/h are demanded; up to "
+        f"{100.0 * handling.CONSTANT_SHARE:g} % of difference counts as constant speed"
+    )
+
+
 def stands(recording: RecordingLike) -> bool:
     """Return whether a car stands in the whole run."""
     return float(np.abs(recording["speed_mps"]).max()) <= _STANDING_MPS

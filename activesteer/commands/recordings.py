@@ -8,7 +8,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -47,7 +47,8 @@ def _info(options: argparse.Namespace) -> None:
         if options.recover.exists() and options.recover.samefile(options.file):
             raise ParameterError(f"--recover {options.recover} is the input file; choose another name")
         recording.save(options.recover)
-        span = f"{len(time_s)} steps up to {time_s[-1]:.3f} s" if len(time_s) else "no steps"
+        none = f"metadata and attachments only; no rows can be read in {shown_path(options.file)}"
+        span = f"{len(time_s)} steps up to {time_s[-1]:.3f} s" if len(time_s) else none
         print(f"{options.recover}: {span}")
         return
     if options.json:
@@ -169,6 +170,7 @@ def _compare(options: argparse.Namespace) -> bool:
     if len(options.files) < 2:
         raise ParameterError("at least two recordings are needed: measured ones, and the simulated one last")
     *measured, simulated = (Recording.open(file, recover=True) for file in options.files)
+    terminal.print_notes(_other_maneuvers(options.files, measured, simulated))
     found = compare(
         measured, simulated, options.standard or "iso19365", filtered=options.filter or "iso15037",
         noise=options.noise != "none",
@@ -182,6 +184,15 @@ def _compare(options: argparse.Namespace) -> bool:
         shifts.append(f"time shift of {name}: {later}")
     terminal.tell(options, found.to_json(), (*page.lines(), *shifts, *assumptions(found)), written, "page")
     return not found.inside
+
+
+def _other_maneuvers(files: Sequence[Path], measured: Sequence[Recording], simulated: Recording) -> Iterator[str]:
+    """Yield a note on each run of another manoeuvre. An import has none, and that of a recording has its name."""
+    last = simulated.metadata.get("maneuver", {}).get("name")
+    for file, run in zip(files, measured, strict=False):
+        name = run.metadata.get("maneuver", {}).get("name")
+        if "measured" not in run.metadata and last not in (name, file.stem):
+            yield f"different manoeuvres: {file} is {name}, {files[-1]} is {last}"
 
 
 def _named(files: Sequence[Path]) -> dict[str, Recording]:

@@ -18,7 +18,7 @@ from activesteer.controllers.front_superposition import FrontSuperposition
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
 from activesteer.controllers.rear_steer import RearSteer
-from activesteer.controllers.registry import CONTROLLERS
+from activesteer.controllers.registry import CONTROLLERS, is_read
 from activesteer.controllers.variant import read_variant
 from activesteer.theory.single_track import SingleTrack, SingleTrackParameters
 
@@ -35,6 +35,7 @@ __all__ = [
     "SingleTrackParameters",
     "controller_spec",
     "declared_parameters",
+    "is_read",
     "is_variant",
     "keys_read",
     "load_controller",

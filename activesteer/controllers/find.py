@@ -10,7 +10,7 @@ import numpy as np
 from activesteer.config import Range, field_path, leaves
 from activesteer.controllers.no_control import NoControl
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
-from activesteer.controllers.registry import IN_EXAMPLES, WITHOUT_FILE
+from activesteer.controllers.registry import IN_EXAMPLES, UNIT_READS, WITHOUT_FILE, is_read
 from activesteer.controllers.variant import read_variant
 from activesteer.core.signals import NO_BRAKES, NO_TORQUES, ActuatorCommand, DriverCommand, Estimate, Measurement
 from activesteer.errors import ControllerError, ParameterError, shown
@@ -39,9 +39,6 @@ class Controller(Protocol):
         """Return the command to the actuators for the next step."""
         ...
 
-
-_UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
-"""Keys of the table [controllers] that set when a command is computed and when it arrives."""
 
 _MAX_ANGLE_RAD: Final = 1.0
 """Largest angle of a command; a larger one is treated as a mistake, such as degrees [rad]."""
@@ -140,11 +137,14 @@ def system_of(given: str) -> str:
 
 
 def keys_read(given: Any) -> frozenset[str]:
-    """Return the keys of the table [controllers] that affect a controller; a user's own code may read all of them."""
+    """Return the keys of the table [controllers] that affect a controller; a user's own code may read all of them.
+
+    A dotted key stands for a table of which a controller reads only a part.
+    """
     plugin = controller_spec(given)
     if not plugin.is_builtin:
         return frozenset(field.name for field in fields(ControllerParameters))
-    return frozenset(plugin.origin.reads) | (frozenset() if plugin.origin is NoControl else _UNIT_READS)
+    return frozenset(plugin.origin.reads) | (frozenset() if plugin.origin is NoControl else UNIT_READS)
 
 
 def declared_parameters(given: Any, gains: ControllerParameters | None = None) -> dict[str, Declared]:
@@ -154,8 +154,9 @@ def declared_parameters(given: Any, gains: ControllerParameters | None = None) -
         own = plugin.declared.items()
         return {f"{table}{plugin.key}.{name}": each for name, each in own if name not in plugin.parameters}
     fixed = {table + ".".join(field_path(ControllerParameters, path)) for path in leaves(plugin.parameters)}
-    found = declared_in(gains or ControllerParameters(), keys_read(plugin), table)
-    return {key: each for key, each in found.items() if key not in fixed}
+    keys = [table + key for key in keys_read(plugin)]
+    found = declared_in(gains or ControllerParameters(), CONTROLLER.reserved, table)
+    return {key: each for key, each in found.items() if key not in fixed and is_read(key, keys)}
 
 
 def load_controller(given: Any, setup: ControllerSetup) -> Controller:

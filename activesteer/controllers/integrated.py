@@ -50,6 +50,7 @@ import functools
 import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,7 @@ from activesteer.controllers.axle_slopes import slopes
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.esc import beyond, stabilising
 from activesteer.controllers.lqr import Lqr, Turn
-from activesteer.controllers.parameters import ControllerSetup, IntegratedParameters
+from activesteer.controllers.parameters import ControllerSetup, EscParameters, IntegratedParameters
 from activesteer.controllers.torque_vectoring import SplitTorques
 from activesteer.controllers.turn_reference import BorneTurnReference, ConfidenceMonitor, confidence
 from activesteer.core.conventions import Array
@@ -130,7 +131,11 @@ class Integrated:
     """State feedback whose corrections are allocated to steering and brakes."""
 
     interval_s = 0.005
-    reads = (*Lqr.reads, "integrated", "esc", "tv")
+    reads = (
+        *Lqr.reads, "integrated", "tv.friction_fraction", "tv.least_fraction",
+        # The moment does not depend on the certainty of the estimate.
+        *(f"esc.{each.name}" for each in fields(EscParameters) if not each.name.endswith("_deviations")),
+    )  # fmt: skip
     rates_radps = Lqr.rates_radps
     gains = IntegratedParameters
 

@@ -2,7 +2,7 @@
 
 A registered class has the method `step` of `Controller` and is made from a `ControllerSetup`. Its attributes say
 
-    reads        keys of the table [controllers] that it reads
+    reads        keys of the table [controllers] that it reads, or dotted keys of a table that it reads in part
     interval_s   time between two calls [s]; every step of the simulation if absent
     rates_radps  rates of the actuators that it needs at the road wheels, by the names of `SteeringRates` [rad/s];
                  a run with slower actuators records a note; absent if any rate suffices
@@ -12,6 +12,7 @@ A registered class has the method `step` of `Controller` and is made from a `Con
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 from activesteer.controllers.esc import Esc
@@ -38,3 +39,10 @@ WITHOUT_FILE: Final = {name: kind for name, kind in CONTROLLERS.items() if not h
 """Controllers whose gains are in the vehicle file."""
 IN_EXAMPLES: Final = {"mpc": "examples/own_mpc.py:EnvelopeMpc"}
 """Examples that replace former controllers, by the former name."""
+UNIT_READS: Final = frozenset(("interval_s", "bus_delay_s"))
+"""Keys of the table [controllers] that set when a command is computed and when it arrives."""
+
+
+def is_read(key: str, keys: Iterable[str]) -> bool:
+    """Return whether a dotted key (with the names of fields) is one of the keys read, is in one, or holds one."""
+    return any(f"{key}.".startswith(f"{each}.") or each.startswith(f"{key}.") for each in keys)

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from activesteer.config import Source, build, field_path, leaves, merged, read_toml, to_table
 from activesteer.controllers.parameters import ControllerParameters, ControllerSetup
-from activesteer.controllers.registry import CONTROLLERS
+from activesteer.controllers.registry import CONTROLLERS, UNIT_READS, is_read
 from activesteer.errors import ControllerError, nearest_names, shown
 from activesteer.resources import find_controller_variant, models_dir
 
@@ -89,6 +89,10 @@ def read_variant(given: str | os.PathLike[str]) -> Variant:
         raise source.fail(
             (), f"no gain differs from {known.system}; give gains, such as [{known.system}] limit_deg = 2"
         )
+    reads = (*CONTROLLERS[known.system].reads, *UNIT_READS)
+    for place, value in leaves(gains).items():
+        if not is_read(".".join(field_path(ControllerParameters, place)), reads):
+            raise source.fail(place, f"has no effect on {known.system}; leave it out", value, reads)
     if path == models_dir() / "controllers" / f"{known.system}.toml":
         gains = {}
     return Variant(known.name, known.title, known.system, gains, source)

@@ -90,16 +90,23 @@ def csv_columns(path: Path) -> list[Column]:
         body = re.sub(r"^[ \t]+|[ \t]+$", "", re.sub(r"[ \t]+", " ", body), flags=re.MULTILINE)
     places = [f"{place}" for place in range(len(names))]
     with understood(path, "table"):
-        table = arrow.read_csv(
-            io.BytesIO(body.encode()),
-            arrow.ReadOptions(column_names=places),
-            arrow.ParseOptions(delimiter=separator),
-            arrow.ConvertOptions(
-                decimal_point="," if comma else ".",
-                null_values=["", "nan", "NaN", "NAN", "-", "n/a", "#N/A"],
-                strings_can_be_null=True,
-            ),
-        )
+        try:
+            table = arrow.read_csv(
+                io.BytesIO(body.encode()),
+                arrow.ReadOptions(column_names=places),
+                arrow.ParseOptions(delimiter=separator),
+                arrow.ConvertOptions(
+                    decimal_point="," if comma else ".",
+                    null_values=["", "nan", "NaN", "NAN", "-", "n/a", "#N/A"],
+                    strings_can_be_null=True,
+                ),
+            )
+        except pa.ArrowInvalid:
+            for number in filled:
+                if (count := len(_cells(lines[number], separator))) != len(names):
+                    problem = f"has {count} instead of {len(names)} cells separated by {separator!r}"
+                    raise RecordingError(problem, file=path.name, line=number + 1) from None
+            raise
 
     def read(place: str, name: str) -> tuple[Array, None]:
         column = table.column(place)
@@ -181,8 +188,11 @@ def _header(head: list[str], separator: str, count: int, path: Path) -> tuple[li
         raise RecordingError(
             f"names {wrong} columns but has {count}; decimal commas need another separator", file=path.name
         )
-    if not rows:
-        raise RecordingError("has no line with the names of its columns above the numbers", file=path.name, line=1)
+    if not rows or all(map(_NUMBER.fullmatch, rows[-1][:count])):
+        problem = "has no line with the names of its columns above the numbers"
+        if head:
+            problem += f"; from here on, lines have {count} cells separated by {separator!r}, and a line above does not"
+        raise RecordingError(problem, file=path.name, line=len(head) + 1)
     units = [""] * count
     if len(rows) > 1 and all(re.fullmatch(r"[\[(]?[^\s]{0,8}[\])]?", cell) for cell in rows[-1]):
         units = [cell.strip("[]()") for cell in rows.pop()[:count]]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from activesteer.core.files import atomic_write, finite
 from activesteer.core.signals import Channel
-from activesteer.errors import RecordingError, not_installed
+from activesteer.errors import RecordingError, nearest_names, not_installed
 from activesteer.recording.contents import ScenePart, metadata_texts
 from activesteer.recording.reader import read_mcap
 from activesteer.recording.rows import FileRows, Poses, values_of
@@ -32,6 +32,17 @@ _MATLAB_NAME_LENGTH: Final = 63
 """Longest name of a variable or field in MATLAB (`namelengthmax`)."""
 _MATLAB_TABLES: Final = ("units", "meanings", "metrics", "metadata")
 """Variables of a MATLAB file in addition to the channels."""
+
+
+class MissingMetricError(RecordingError, KeyError):
+    """Error for a metric that a run does not have."""
+
+    __str__ = Exception.__str__
+
+
+class _Metrics(dict[str, float]):
+    def __missing__(self, name: object) -> float:
+        raise MissingMetricError(f"no metric {name!r} in this recording: {nearest_names(str(name), self)}", value=name)
 
 
 class Recording:
@@ -98,7 +109,7 @@ class Recording:
             raise RecordingError(
                 f"is {found!r} where numbers by name are expected", file="the metadata", key="metrics", value=found
             )
-        self.metrics: dict[str, float] = {**found, **(metrics or {})}
+        self.metrics: dict[str, float] = _Metrics({**found, **(metrics or {})})
         self.attachments: dict[str, bytes] = dict(attachments or {})
         self.scene: tuple[ScenePart, ...] = tuple(scene)
         if poses is None and not isinstance(self._values, FileRows):
@@ -352,12 +363,12 @@ def _written(path: str | os.PathLike[str], write: Callable[[Path], object]) -> P
 
 def run_names(sources: Sequence[str | Path], recordings: Iterable[Recording]) -> list[str]:
     """Return a name for each run: its controller, or its file if controllers repeat."""
-    # A user's controller is named by file and class; the class is enough.
-    controllers = [
-        str(run.metadata.get("controller", "run")).rpartition(":")[2]
-        + ("+truth" if run.metadata.get("controller_uses_truth") else "")
-        for run in recordings
-    ]
+    controllers = []
+    for run in recordings:
+        # A user's controller is named by file and class; the class is enough. A parameter may contain a colon too.
+        name, mark, parameters = str(run.metadata.get("controller", "run")).partition("?")
+        uses_truth = "+truth" if run.metadata.get("controller_uses_truth") else ""
+        controllers.append(name.rpartition(":")[2] + mark + parameters + uses_truth)
     if len(set(controllers)) == len(controllers):
         return controllers
     paths = [str(source).removesuffix(".mcap") for source in sources]

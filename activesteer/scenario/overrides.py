@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from activesteer.config import Source, check_overruled, field_path, merged
-from activesteer.controllers import CONTROLLER, ControllerParameters, controller_spec, keys_read
+from activesteer.config import Source, check_overruled, field_path, key_paths, merged
+from activesteer.controllers import CONTROLLER, ControllerParameters, controller_spec, is_read, keys_read
 from activesteer.errors import ParameterError, shown
 from activesteer.plugins import Plugin
 
@@ -97,14 +97,15 @@ def gain_paths(overrides: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 def unread_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> dict[str, frozenset[str]]:
     """Return the overrides that no controller reads, with the keys that they set."""
     read = frozenset[str]().union(*map(keys_read, controllers))
-    replaced = {
-        key: _BUILT_IN.intersection(path[:1] or (value if isinstance(value := overrides[key], Mapping) else ()))
-        for key, path in gain_paths(overrides).items()
-    }
+    replaced = dict[str, frozenset[str]]()
+    for key, path in gain_paths(overrides).items():
+        inside = value if isinstance(value := overrides[key], Mapping) else ()
+        is_known = (dotted := ".".join(path)) in key_paths(ControllerParameters)
+        replaced[key] = frozenset({dotted}) if is_known else _BUILT_IN.intersection(path[:1] or inside)
     if own := {key: path[0] for key in overrides if (path := own_path(key))}:
         replaced |= {key: frozenset({name}) for key, name in own.items()}
         read |= own_controllers(controllers).keys()
-    return {key: names for key, names in replaced.items() if names and not names & read}
+    return {key: names for key, names in replaced.items() if names and not any(is_read(name, read) for name in names)}
 
 
 def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
@@ -116,12 +117,15 @@ def read_by(overrides: Mapping[str, Any], controller: Any) -> dict[str, Any]:
 def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> None:
     """Check that every override of the table [controllers] is read by one of these controllers."""
     for key, names in unread_gains(overrides, controllers).items():
-        readers = [name for name in CONTROLLER.names() if names & keys_read(name)]
+        readers = [name for name in CONTROLLER.names() if any(is_read(each, keys_read(name)) for each in names)]
         if own_path(key):
             problem = f"has no effect: no controller {', '.join(names)} drives here"
             raise ParameterError(problem, key=key, value=overrides[key], overridden=True)
         driving = " and ".join(controller_spec(given).label for given in controllers)
-        allowed = [f"controllers.{name}" for name in sorted(frozenset[str]().union(*map(keys_read, controllers)))]
+        read = sorted(frozenset[str]().union(*map(keys_read, controllers)))
+        tables = sorted({each.partition(".")[0] for each in read})
+        parts = [each for each in read if any(name.startswith(each.partition(".")[0] + ".") for name in names)]
+        allowed = [f"controllers.{name}" for name in parts or tables]
         words = "controller {} reads" if len(controllers) == 1 else "controllers {} read"
         here = f"{words.format(driving)} {', '.join(allowed)}" if controllers else "no controller drives here"
         given = ", ".join(f"controllers.{name}" for name in sorted(names))
@@ -138,7 +142,8 @@ def each_overrides(overrides: Mapping[str, Any] | Sequence[Mapping[str, Any]] | 
         arrays = {key: value for key, value in table.items() if isinstance(value, np.ndarray) and value.ndim}
         for key, value in arrays.items():
             if len(value) != n:
-                raise ParameterError(f"has {len(value)} values; one for each of {n} cars is needed", key=key)
+                needed = f"one for each of {n} cars is needed in an array, and a list is one value for all"
+                raise ParameterError(f"has {len(value)} values; {needed}", key=key)
         return [table | {key: value[car].tolist() for key, value in arrays.items()} for car in range(n)]
     if isinstance(overrides, (str, bytes)) or not all(isinstance(changes, Mapping) for changes in overrides):
         raise ParameterError(f"is {shown(overrides)}; a table, or a list of tables, is needed", key="overrides")

@@ -393,5 +393,7 @@ def _named(car: int) -> Iterator[None]:
     try:
         yield
     except ActiveSteerError as error:
-        error.add_note(f"car {car} of the batch")
+        listed = error.overridden and isinstance(error.value, (list, tuple))
+        rule = "; an array has a value for each car, a list is one for all" * listed
+        error.add_note(f"car {car} of the batch{rule}")
         raise

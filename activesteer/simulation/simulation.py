@@ -437,20 +437,22 @@ class Simulation(Copyable):
             recording.metadata["realtime"] = self._pacer.report()
         if self._link is not None:
             recording.metadata[self._link.name] = dict(self._link.report)
-        if self.events:
-            recording.metadata["events"] = [event._asdict() for event in self.events]
         if failure is not None:
             recording.metadata["error"] = f"{type(failure).__name__}: {failure}"
         elif not self.done:
             recording.metadata["error"] = f"driven to {self.time_s:g} of {self.scenario.maneuver.duration_s:g} s"
         else:
             # A car that is only stepped needs no evaluation.
-            from activesteer.analysis.metrics import metrics  # noqa: PLC0415
+            from activesteer.analysis.metrics import metrics, speed_note  # noqa: PLC0415
 
             try:
                 recording.metrics.update(metrics(recording))
+                if (note := speed_note(recording)) and all(event.what != note for event in self.events):
+                    self._note("note", note)
             except RecordingError as error:
                 recording.metadata["metrics_error"] = str(error)
+        if self.events:
+            recording.metadata["events"] = [event._asdict() for event in self.events]
         return recording
 
     @contextmanager

@@ -344,6 +344,7 @@ def check_points(table: CarTable, kinds: Mapping[str, AxleKind], source: Source)
         *_contradictions(table),
         *_length_problems(table),
         *_unit_problems(table),
+        *_side_problems(table),
     ]
     if problems:
         head = f"{source.name}: {len(problems)} error{'s' * (len(problems) != 1)}:"
@@ -448,6 +449,18 @@ def _unit_problems(table: CarTable) -> Iterator[str]:
             if not low <= value <= high and value != 0.0:
                 hint = f"; is it in {unit}? then write {value * factor:g}" if low <= value * factor <= high else ""
                 yield f"{path}: {value:g} is not a value of a road car ({low:g} to {high:g}){hint}"
+
+
+def _side_problems(table: CarTable) -> Iterator[str]:
+    points = {key: point for key, point in all_points(table) if len(point) == len(table.origin) == 3}
+    wrong = [key for key, (_, y, _) in points.items() if not key.startswith("mass.") and y <= table.origin[1]]
+    if wrong:
+        more = f" and {len(wrong) - 6} more" if len(wrong) > 6 else ""
+        example = f"y of {wrong[0]} is {points[wrong[0]][1]:g}"
+        yield (
+            f"{', '.join(wrong[:6])}{more}: not on the left side, where y is above {table.origin[1]:g} "
+            f"{table.units}; {example}"
+        )
 
 
 def _numbers(part: Any, path: str = "") -> Iterator[tuple[str, float]]:

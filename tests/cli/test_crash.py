@@ -16,6 +16,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 from activesteer import Recording
+from activesteer.core.signals import Channel
 from activesteer.simulation.recorder import BLOCK_INTERVAL_S
 from tests.cli.process import MAIN, ended
 
@@ -113,6 +114,13 @@ def test_recovered_file_of_a_killed_run_opens_in_readers_that_seek(call, left, t
     refused = call("info", left, "--recover", left)
     assert refused.status == 1
     assert "is the input file; choose another name" in refused.err
+
+
+def test_the_line_about_a_recovered_file_says_that_it_has_no_rows(call, tmp_path):
+    Recording([Channel("speed_mps", "m/s", "", "vehicle")], [], [], metadata={"a": 1}).save(tmp_path / "a.mcap")
+    told = call("info", "a.mcap", "--recover", "b.mcap")
+    assert told.out == "b.mcap: metadata and attachments only; no rows can be read in a.mcap\n"
+    assert Recording.open(tmp_path / "b.mcap").metadata["a"] == 1
 
 
 @pytest.mark.slow

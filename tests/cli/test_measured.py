@@ -91,6 +91,16 @@ def test_what_cannot_be_compared_or_imported_is_answered(call, truth, tmp_path):
     assert "steering_wheel_rad or rack_m is needed" in call("run", "a.mcap").err
 
 
+def test_a_comparison_of_different_manoeuvres_says_so(call, truth, tmp_path):
+    for name in ("a", "b"):
+        metadata = truth.metadata | {"maneuver": truth.metadata["maneuver"] | {"name": f"drive_{name}"}}
+        values = np.column_stack([truth[channel.name] for channel in truth.channels])
+        Recording(truth.channels, truth.time_s, values, metadata=metadata).save(tmp_path / f"{name}.mcap")
+    told = call("compare", "a.mcap", "b.mcap")
+    assert (told.status, told.err) == (0, "! different manoeuvres: a.mcap is drive_a, b.mcap is drive_b\n")
+    assert call("compare", "a.mcap", "a.mcap").err == ""
+
+
 def test_a_folder_that_cannot_be_made_is_an_error_before_the_fit(call):
     told = call("fit", "tesla_model_s", "-o", "/proc/found")  # also for root
     assert told.status == 1

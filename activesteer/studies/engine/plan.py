@@ -12,7 +12,7 @@ import numpy as np
 
 from activesteer.analysis.claims.judge import SYSTEMS
 from activesteer.config import leaves
-from activesteer.controllers import keys_read, load_controller
+from activesteer.controllers import is_read, keys_read, load_controller
 from activesteer.errors import ActiveSteerError, ParameterError, nearest_names, shown
 from activesteer.scenario import Scenario, check_gains, describe
 from activesteer.studies.engine.design import Samples
@@ -216,7 +216,7 @@ def _is_read(path: tuple[str, ...], scenario: Scenario, controllers: Sequence[st
         return False
     others = [name for name in controllers if name != "none"]
     if part == "vehicle" and first == "controllers":
-        return any(rest[0] in keys_read(name) for name in others)
+        return any(is_read(".".join(path[2:]), keys_read(name)) for name in others)
     if part == "vehicle" and first == "single_track" and rest[0] != "mass_kg":  # the speed controller uses it too
         return bool(others) or follows_path or scenario.maneuver.settling_setpoint().curvature_demand_1pm is not None
     if part == "driver":

@@ -18,6 +18,7 @@ from activesteer.analysis.metrics import (
     metrics,
     ride_metrics,
     seat_acceleration_mps2,
+    speed_note,
     weighted,
     weighting,
 )
@@ -49,6 +50,17 @@ def wave(kind: str = "open_loop") -> SyntheticRun:
 def test_step_steer_gets_the_metrics_of_iso_7401():
     run = step_steer()
     assert metrics(run) == pytest.approx(step_response.step_response_metrics(run), nan_ok=True)
+
+
+@pytest.mark.parametrize("kind", ["step_steer", "sine_sweep", "random_steer"])
+def test_a_response_at_another_speed_than_demanded_is_noted(kind):
+    run = wave(kind)
+    run.metadata["maneuver"]["speed_mps"] = 20.0
+    for share, said in ((0.0, False), (0.019, False), (-0.019, False), (0.021, True), (-0.021, True)):
+        run.channels["speed_mps"] = np.where(TIME_S > 1.0, 20.0 * (1.0 + share), 20.0)
+        assert bool(speed_note(run)) is said
+    run.metadata["maneuver"]["kind"] = "open_loop"
+    assert speed_note(run) == ""
 
 
 @pytest.mark.parametrize("kind", ["open_loop", "random_steer"])

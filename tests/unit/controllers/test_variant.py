@@ -80,3 +80,14 @@ def test_observer_can_be_the_system_of_a_variant(tmp_path):
     estimate = observer.step(steering(0.0), measured(0.0)).estimate
     assert estimate is not None
     assert estimate.friction == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_gain_that_the_system_does_not_read_is_an_error(tmp_path):
+    path = tmp_path / "mine.toml"
+    for system, table in (("ars", "afs"), ("integrated", "esc"), ("integrated", "tv")):
+        key = "limit_deg" if table == "afs" else "sideslip_deviations" if table == "esc" else "full_speed_mps"
+        path.write_text(f'system = "{system}"\n[{table}]\n{key} = 2.0\n')
+        with raises(ControllerError, file="mine.toml", line=3, key=f"{table}.{key}", value=2.0):
+            read_variant(path)
+    path.write_text('system = "integrated"\ninterval_s = 0.01\n[esc]\ntorque_limit_Nm = 900.0\n')
+    assert read_variant(path).gains == {"interval_s": 0.01, "esc": {"torque_limit_Nm": 900.0}}

@@ -312,6 +312,17 @@ def test_a_wrong_unit_or_sign_is_suspected_in_one_line(factors, said):
             b"time;yaw_rate_radps\n0,1;0\n0,2;0.1\n",
             "a.csv: column 'yaw_rate_radps' mixes decimal points and commas",
         ),
+        (
+            "a.csv",
+            b"time;yaw_rate_radps\n0.1;0\n0.2;0\n\n0.3,0\n0.4,0\n",
+            "a.csv, line 5: has 1 instead of 2 cells separated by ';'",
+        ),
+        (
+            "a.csv",
+            b"time,yaw_rate_radps\n0.1,0\n0.2,0\n0.3;0\n0.4;0\n",
+            "a.csv, line 4: has no line with the names of its columns above the numbers; from here on, lines have 2",
+        ),
+        ("a.csv", b"time,yaw_rate_radps,v\n0,1,2\n1,1\n2,1,2\n3,1,2\n", "a.csv, line 4: has no line with the names"),
         ("a.csv", b"time,yaw_rate_radps\n0,0\n1,0\n0.5,0\n", "goes backwards, from 1 to 0.5 s"),
         ("a.csv", b"time,yaw_rate_radps\n0,0\n", "fewer than two samples"),
         ("a.csv", b"time,yaw_rate_radps[bar]\n0,0\n1,1\n", "yaw_rate_radps"),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -10,6 +11,7 @@ from activesteer.core.signals import Channel
 from activesteer.errors import RecordingError
 from activesteer.recording import Link, McapWriter, Poses, Primitive, Recording
 from activesteer.recording.contents import check_metrics
+from activesteer.recording.recording import run_names
 from tests.raising import raises
 from tests.unit.recording.conftest import assert_same
 
@@ -93,6 +95,22 @@ def test_an_unknown_channel_names_the_nearest(recording: Recording) -> None:
 def test_metrics_are_taken_from_metadata(channels: list[Channel]) -> None:
     made = Recording(channels, [], [], metadata={"metrics": {"a_s": 1.0, "b_s": 2.0}}, metrics={"b_s": 3.0})
     assert made.metrics == {"a_s": 1.0, "b_s": 3.0}
+
+
+def test_a_run_has_the_class_and_the_parameters_of_its_controller_as_name(channels: list[Channel]) -> None:
+    given = {"none": "none", "a/mine.py:Mine": "Mine", 'mine.py:Mine?side="a:b"&gain=2': 'Mine?side="a:b"&gain=2'}
+    runs = [Recording(channels, [], [], metadata={"controller": name}) for name in given]
+    assert run_names(["a.mcap", "b.mcap", "c.mcap"], runs) == list(given.values())
+
+
+def test_a_wrong_metric_is_answered_with_the_nearest(channels: list[Channel]) -> None:
+    made = Recording(channels, [], [], metrics={"tb_s": 1.0, "yaw_rate_overshoot": 0.1})
+    for copied in (made, pickle.loads(pickle.dumps(made))):
+        with raises(RecordingError, value="yaw_overshoot") as caught:
+            copied.metrics["yaw_overshoot"]
+        assert isinstance(caught.value, KeyError)
+        assert str(caught.value) == "no metric 'yaw_overshoot' in this recording: did you mean 'yaw_rate_overshoot'?"
+        assert copied.metrics.get("yaw_overshoot") is None
     assert made.metadata == {"complete": True}
 
 

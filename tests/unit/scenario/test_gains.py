@@ -5,9 +5,17 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from activesteer.controllers import CONTROLLERS, ControllerParameters, controller_spec, keys_read
+from activesteer import simulate
+from activesteer.controllers import (
+    CONTROLLERS,
+    ControllerParameters,
+    controller_spec,
+    declared_parameters,
+    keys_read,
+)
 from activesteer.controllers.variant import Variant
 from activesteer.errors import ParameterError
 from activesteer.resources import list_controller_variants
@@ -34,7 +42,7 @@ def test_controller_says_what_it_reads(name, monkeypatch):
     asked = Asked(setup.gains)
     monkeypatch.setattr(Variant, "gains_in", lambda _, setup: setup.gains)
     controller_spec(name).make(replace(setup, gains=asked))  # pyright: ignore[reportArgumentType]
-    assert asked.names == keys_read(name) - {"interval_s", "bus_delay_s"}
+    assert asked.names == {key.partition(".")[0] for key in keys_read(name)} - {"interval_s", "bus_delay_s"}
 
 
 def test_code_of_a_users_own_may_read_everything(tmp_path):
@@ -49,6 +57,29 @@ def test_one_of_the_controllers_must_read_a_setting():
     for controllers in ([], ["none"], ["afs", "lqr"], ["integrated"]):
         with raises(ParameterError, key="controllers.ars.limit_deg", value=2.0):
             check_gains(LIMIT, controllers)
+
+
+def test_a_key_of_a_table_that_is_read_in_part_needs_a_controller_that_reads_it():
+    for key in ("controllers.esc.friction_deviations", "vehicle.controllers.tv.sideslip_limit_deg"):
+        with raises(ParameterError, key=key, value=2.0) as caught:
+            check_gains({key: 2.0}, ["none", "integrated"])
+        assert str(caught.value).endswith(f"is read by {key.split('.')[-2]}")
+        check_gains({key: 2.0}, ["integrated", "esc", "tv"])
+    check_gains({"controllers.esc.torque_limit_Nm": 900.0, "controllers.tv.least_fraction": 0.1}, ["integrated"])
+    check_gains({"controllers.esc": {}}, ["integrated"])
+
+
+def test_keys_that_a_controller_leaves_out_of_a_table_have_no_effect_on_it():
+    setup = {"settle_s": 0.2, "duration_s": 4.0, "steer.steering_wheel_deg": 120.0, "road.mu": 0.35}
+    all_keys, read = (declared_parameters("esc") | declared_parameters("tv")), declared_parameters("integrated")
+    left_out = {key: 1.1 * each.default for key, each in all_keys.items() if key not in read}
+    assert {key.split(".")[1] for key in left_out} == {"esc", "tv"}
+    changed = {"controllers.esc.yaw_rate_time_s": 0.05}
+    base, other, seen = (
+        simulate("sine_with_dwell", "integrated", "compact_electric", setup | more) for more in ({}, left_out, changed)
+    )
+    assert np.array_equal(base.values, other.values)
+    assert not np.array_equal(base.values, seen.values)
 
 
 def test_shared_settings_are_those_of_each_that_shares_them():

@@ -11,7 +11,7 @@ import activesteer
 from activesteer import ActuatorCommand, Batch, DriverCommand, Simulation
 from activesteer.controllers import NoControl
 from activesteer.core.signals import numbers_in
-from activesteer.errors import ActiveSteerError, ControllerError, ParameterError
+from activesteer.errors import ActiveSteerError, ControllerError, ManeuverError, ParameterError
 from activesteer.scenario import resolve
 from tests.raising import raises
 
@@ -197,6 +197,15 @@ def test_a_diverging_car_stops_alone() -> None:
 def test_wrong_inputs_are_refused(arguments: dict, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         Batch("straight_line", **arguments)
+
+
+def test_the_error_of_a_list_says_that_an_array_has_a_value_for_each_car() -> None:
+    with raises(ManeuverError, key="road.mu", value=[0.3, 0.5]) as caught:
+        Batch("straight_line", 2, overrides={"road.mu": [0.3, 0.5]})
+    assert "array" in caught.value.__notes__[0]
+    with pytest.raises(ManeuverError) as other:
+        Batch("straight_line", 2, overrides={"road.mu": -1.0})
+    assert "array" not in other.value.__notes__[0]
 
 
 def test_a_scenario_gets_its_amplitude_as_in_a_simulation() -> None:

@@ -65,6 +65,20 @@ def test_a_remark_is_an_event_at_the_current_time() -> None:
     assert events_of(simulation.recording().metadata) == [(0.1, "note", "brakes are hot")]
 
 
+def test_a_car_that_cannot_keep_the_speed_of_a_response_is_an_event_at_the_end(tmp_path: Path) -> None:
+    for speed_kmh, noted in ((80.0, []), (300.0, [(2.5, "note")])):
+        simulation = step_steer(speed_kmh=speed_kmh, duration_s=2.5)
+        with simulation.recorded_to(tmp_path / "a.mcap"):
+            simulation.run()
+            for _ in range(2):  # the second adds none
+                recording = simulation.recording()
+            simulation.end_file(recording)
+        events = events_of(recording.metadata)
+        assert [event[:2] for event in events] == noted
+        assert events == events_of(Recording.open(tmp_path / "a.mcap").metadata)
+        assert all("300 km/h are demanded" in event.what and "2 %" in event.what for event in events)
+
+
 @pytest.mark.parametrize(
     ("controller", "key"), [("ars", "ars.limit_deg"), ("lqr", "servos.lag_s"), (Follows, "Follows.gain_s")]
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,16 @@ def test_metres_where_millimetres_are_stated(tmp_path: Path) -> None:
     path = tmp_path / "small.csv"
     path.write_text("units, mm\nfront.wheel_centre, 0, 0.762, 0.297\n")
     assert "are they in m?" in problems(path)
+
+
+def test_points_of_the_right_side_are_named_in_one_line(tmp_path: Path) -> None:
+    old = next(line for line in COMPACT.read_text().splitlines() if line.startswith("tie_rod_outer"))
+    told = problems(changed(COMPACT, tmp_path, (old, old.replace("[", "[0.0, -1.0, 2.0]  # ", 1))))
+    assert ": 1 error: front.points.tie_rod_outer: not on the left side, where y is above 0 mm; y of front" in told
+    table, source = read_table(COMPACT)
+    moved = replace(table, origin=(0.0, 700.0, 0.0))
+    with pytest.raises(ParameterError, match=r": 1 error: .* and \d+ more: not on the left side, .* above 700 mm"):
+        check_points(moved, chosen_kinds(moved), source)
 
 
 @pytest.mark.parametrize(
