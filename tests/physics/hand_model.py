@@ -1,4 +1,6 @@
-"""A linear hand calculation of the compact, independent of the program: from its README and its tyre file.
+"""A linear hand calculation of the compact, independent of the program's equations of motion.
+
+Its numbers come from the car's README, the vehicle file, the tyre file and the K&C rig (`activesteer kc`).
 
 It has the 11 states of `STATES`. Axes and signs follow ISO 8855. `v` is the lateral speed of the contact points at the
 longitudinal position of the centre of gravity, `phi` the roll angle of the body, and `phi_t` the part of the roll angle
@@ -27,7 +29,7 @@ STATES = ("v", "r", "phi", "p", "phi_t", "slip_f", "slip_r", "steer", "d_steer",
 RELAXATION, STEERING, ROLL = STATES[5:7], STATES[7:], STATES[2:5]
 G_MPS2, DEG = 9.81, math.pi / 180.0
 
-# The car's README: mass, inertia, wheelbase, centre of gravity, ratio, wheel.
+# The car's README: mass, inertia, wheelbase, ratio, wheel. The height of the centre of gravity is that of the rig.
 MASS_KG, ROLL_INERTIA_KGM2, YAW_INERTIA_KGM2 = 1430.0, 530.0, 2200.0
 WHEELBASE_M, TO_FRONT_M, CG_HEIGHT_M, RATIO = 2.637, 1.0821, 0.5433, 15.8
 WHEEL_HEIGHT_M, ROLLING_RADIUS_M, SPIN_KGM2, DIAMETER_KGM2 = 0.295, 0.313, 1.0, 0.58
@@ -37,7 +39,7 @@ VIBRATION_MPS = 0.07  # smooths the friction of the dampers
 
 
 class Axle(NamedTuple):
-    """Numbers of an axle in the README and the vehicle file, per wheel where not said otherwise."""
+    """Numbers of an axle in the README, the vehicle file and the K&C rig, per wheel where not said otherwise."""
 
     load_N: float
     unsprung_kg: float
