@@ -6,8 +6,8 @@ angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
     M_z = J_z / T_r (error beyond its band) + J_z / T_b^2 (sideslip beyond its limit)
 
 with the error of the yaw rate, desired minus actual. The controller acts only as far as the estimate is certain: the
-friction that limits the desired yaw rate includes its standard deviation, and the limit of the sideslip angle is at
-least three of its deviations. The outer front wheel creates a moment against the turn (oversteer), which also lowers
+friction that limits the desired yaw rate includes its standard deviation and bears at least the measured lateral
+acceleration, and the limit of the sideslip angle is at least three of its deviations. The outer front wheel creates a moment against the turn (oversteer), which also lowers
 its side force. The inner rear wheel creates a moment with the turn (understeer):
 
     brake torque = |M_z| rolling radius / (half the track)
@@ -23,6 +23,7 @@ from __future__ import annotations
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
+from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 
@@ -44,7 +45,9 @@ class Esc:
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
-        friction = now.friction + p.friction_deviations * now.friction_std
+        # The road bears the present acceleration, so it has no reserve. A turn at a_y / v needs no brakes.
+        shown = abs(measurement.ay_mps2) / (p.friction_fraction * GRAVITY_MPS2)
+        friction = max(now.friction + p.friction_deviations * now.friction_std, shown)
         desired = self._reference.borne(command.front_steer_demand_rad, now.speed_mps, friction, measurement.ay_mps2)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(yaw_rate_desired_radps=desired, estimate=now)

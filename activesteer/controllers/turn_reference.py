@@ -96,9 +96,8 @@ class BorneTurnReference(TurnReference):
 
     def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
         """Return the desired yaw rate for a speed > 0 and a measured lateral acceleration, left positive [rad/s]."""
-        # The road bears the present acceleration, so no reserve counts. Where wheels leave snow, the estimated friction
-        # comes later.
-        shown = max(friction, abs(ay_mps2) / self._most_mps2)
+        # The road bears the present acceleration. Where wheels leave snow, the estimated friction comes later.
+        shown = max(friction, abs(ay_mps2) / GRAVITY_MPS2)
         desired_radps = desired_turn(self, front_steer_rad, speed_mps, shown)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)

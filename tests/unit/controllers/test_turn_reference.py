@@ -44,13 +44,3 @@ def test_a_desired_turn_that_has_fallen_meanwhile_does_not_fall_twice(friction):
     for _ in range(20):
         wanted = desired_turn(steered, angle_rad, SPEED_MPS, friction)
         assert reference.borne(angle_rad, SPEED_MPS, friction, wanted * SPEED_MPS - 0.4) == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("name", ["esc", "tv"])
-def test_a_turn_at_the_measured_acceleration_is_desired_although_the_estimate_still_says_snow(name, side):
-    """A car with a constant sideslip angle turns at a_y / v; it is not braked behind snow."""
-    reference = BorneTurnReference(CAR, getattr(setup().gains, name), 0.005)
-    ay_mps2 = side * 6.0
-    turns = [reference.borne(side * 0.1, SPEED_MPS, 0.2, ay_mps2) for _ in range(1000)]
-    assert turns[-1] == pytest.approx(ay_mps2 / SPEED_MPS)
