@@ -140,7 +140,7 @@ def test_the_desired_yaw_rate_is_limited_by_a_friction_only_as_far_as_it_is_cert
     desired = []
     for std in (0.0, 0.2):
         esc = knowing(known, Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.4, *[0.0] * 4, std))
-        desired.append(held(esc, steering(0.1), measured(3.2 / SPEED_MPS, SPEED_MPS), 500).yaw_rate_desired_radps)
+        desired.append(held(esc, steering(0.1), measured(3.5 / SPEED_MPS, SPEED_MPS), 500).yaw_rate_desired_radps)
     assert desired[0] == pytest.approx(0.9 * 0.4 * GRAVITY_MPS2 / SPEED_MPS)
     assert desired[1] > 1.1 * desired[0]
 
@@ -148,12 +148,12 @@ def test_the_desired_yaw_rate_is_limited_by_a_friction_only_as_far_as_it_is_cert
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_turn_at_the_measured_acceleration_is_left_alone_although_the_estimate_still_says_snow(known, side):
     """With a constant sideslip angle, a car turns at a_y / v. A faster rotation by 6 deg/s is braked."""
-    ay_mps2, snow = 6.0, Estimate(SPEED_MPS, 0.0, 0.0, 0.0, 0.2, *[0.0] * 4, 0.0)
-    yaw_rate_radps = side * ay_mps2 / SPEED_MPS
-    turning = held(knowing(known, snow), steering(side * 0.1), measured(yaw_rate_radps, SPEED_MPS), 500)
-    assert turning.yaw_rate_desired_radps == pytest.approx(yaw_rate_radps)
-    assert not any(turning.brake_torque_demand_Nm)
-    faster = measured(yaw_rate_radps + side * math.radians(6.0), SPEED_MPS)._replace(ay_mps2=side * ay_mps2)
-    assert (
-        held(knowing(known, snow), steering(side * 0.1), faster, 500).brake_torque_demand_Nm[1 if side > 0 else 0] > 0.0
-    )
+    turn_radps, wheel = side * 6.0 / SPEED_MPS, 1 if side > 0.0 else 0
+    for beyond_radps in (0.0, side * math.radians(6.0)):
+        yaw_rate_radps = turn_radps + beyond_radps
+        snow = Estimate(SPEED_MPS, 0.0, 0.0, yaw_rate_radps, 0.2, *[0.0] * 5)
+        shown = measured(yaw_rate_radps, SPEED_MPS)._replace(ay_mps2=side * 6.0)
+        command = held(knowing(known, snow), steering(side * 0.1), shown, 500)
+        assert command.yaw_rate_desired_radps == pytest.approx(turn_radps)
+        braked = [torque > 0.0 for torque in command.brake_torque_demand_Nm]
+        assert braked == [bool(beyond_radps) and index == wheel for index in range(4)]
