@@ -99,7 +99,7 @@ class YawMomentParameters:
     limit [s]."""
     reference_length_m: _Length
     """Distance over which the desired yaw rate follows the driver [m]. The car's own lag limits its time."""
-    friction_fraction: _Fraction
+    friction_fraction: Annotated[float, Range(0.1, 1.0)]
     """Fraction of the estimated friction that the desired yaw rate and, with `tv`, a wheel may use [-]."""
     acceleration_time_s: _Lag
     """T_a: time in which the lateral acceleration follows the desired yaw rate [s]."""
