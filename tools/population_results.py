@@ -144,6 +144,7 @@ class SystemEffect:
             controller is not compared with them.
         harmed: Samples with harm; see `analysis.harm`.
         harmed_anywhere: The same, counting stops where the car without control leaves its line.
+        harmed_unspun: Samples with harm, of those in which the car without control does not spin.
         growth: Distribution of each measure of harm.
         worst_track_m: Largest growth of lane overstep or path error [m]; nan without such a measure.
         vehicle: The car; empty for all cars of the population.
@@ -159,6 +160,7 @@ class SystemEffect:
     lower: Proportion = Proportion()
     harmed: Proportion = Proportion()
     harmed_anywhere: Proportion = Proportion()
+    harmed_unspun: Proportion = Proportion()
     growth: tuple[Change, ...] = ()
     worst_track_m: float = math.nan
     vehicle: str = ""
@@ -195,7 +197,7 @@ class SystemEffect:
         return cls(**known | read)
 
 
-_PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere")
+_PROPORTIONS: Final = ("saved", "spoiled", "lower", "harmed", "harmed_anywhere", "harmed_unspun")
 
 
 @dataclass(frozen=True)
@@ -545,6 +547,9 @@ def _effect(system: str, scenario: str, both: Sequence[tuple[Row, Row]], **other
         spun=sum(has_spun(row) for _, row in both),
         harmed=_count(bool(harms(growth)) for growth in grown),
         harmed_anywhere=_count(bool(_harms_anywhere(growth)) for growth in grown),
+        harmed_unspun=_count(
+            bool(harms(growth)) for (row, _), growth in zip(both, grown, strict=True) if not has_spun(row)
+        ),
         growth=tuple(
             _distribution(name, [growth[name] for growth in grown if name in growth])
             for name in dict.fromkeys(name for growth in grown for name in growth)

@@ -162,6 +162,12 @@ def _comparison(found: Population) -> list[str]:
         lines.append(_row(scenario.replace("_", " "), [str(effect.harmed) for effect in own]))
     lines.append(_row("**all scenarios**", [str(total.harmed) for total in totals]))
     lines.append(_row("the same, with all stops counted", [str(total.harmed_anywhere) for total in totals]))
+    lines.append(
+        _row(
+            "runs with harm, of the cars that do not spin without control",
+            [str(total.harmed_unspun) for total in totals],
+        )
+    )
     lines.append(_row("pairs of runs", [str(total.harmed.number) for total in totals]))
     lines.append(_row("saved, of the cars lost without control", [str(total.saved) for total in totals]))
     lines.append(

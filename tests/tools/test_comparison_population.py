@@ -61,7 +61,7 @@ def test_the_best_of_the_references_is_taken_sample_by_sample():
     assert effect_of(found, "ars").lower == Proportion(0, 0)
     assert lqr.median_change(SIDESLIP_PEAKS) == pytest.approx((-0.89 - 0.05) / 2.0)
     assert math.isnan(lqr.median_change([STEERING_EFFORT]))
-    assert lqr.harmed == Proportion(1, 4)  # the lost one
+    assert (lqr.harmed, lqr.harmed_unspun) == (Proportion(1, 4), Proportion(1, 2))  # the lost one
     assert not any(target.passed for target in population_targets(found) if "harms" in target.text)
 
 
