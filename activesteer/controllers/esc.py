@@ -7,7 +7,7 @@ angle as inputs; and operation at all speeds above 20 km/h. Here the moment is
 
 with the error of the yaw rate, desired minus actual. The controller acts only as far as the estimate is certain: the
 friction that limits the desired yaw rate includes its standard deviation, and the limit of the sideslip angle is at
-least three of its deviations. A turn at the measured acceleration, r = a_y / v, is never limited. The outer front wheel
+least six of its deviations. A turn at the measured acceleration, r = a_y / v, is never limited. The outer front wheel
 creates a moment against the turn (oversteer), which also lowers its side force. The inner rear wheel creates a moment
 with the turn (understeer):
 

@@ -128,7 +128,7 @@ def knowing(known, now):
 
 @pytest.mark.parametrize(("sideslip_deg", "std_deg", "braked"), [(4.0, 0.4, True), (4.0, 1.4, False), (9.0, 1.4, True)])
 def test_only_a_sideslip_angle_that_is_certain_is_braked(known, sideslip_deg, std_deg, braked):
-    """4 deg, beyond the limit of 3 deg, are no slide if the estimate may be wrong by three times 1.4 deg."""
+    """4 deg, beyond the limit of 3 deg, are no slide if the estimate may be wrong by six times 1.4 deg."""
     for side, wheel in ((1.0, 0), (-1.0, 1)):
         sideslip_rad, std_rad = side * math.radians(sideslip_deg), math.radians(std_deg)
         now = Estimate(SPEED_MPS, SPEED_MPS * sideslip_rad, sideslip_rad, 0.0, 0.9, 0.0, 0.0, std_rad, 0.0, 0.0)
