@@ -128,6 +128,10 @@ def check_gains(overrides: Mapping[str, Any], controllers: Sequence[Any]) -> Non
         allowed = [f"controllers.{name}" for name in parts or tables]
         words = "controller {} reads" if len(controllers) == 1 else "controllers {} read"
         here = f"{words.format(driving)} {', '.join(allowed)}" if controllers else "no controller drives here"
+        if parts:
+            table = parts[0].partition(".")[0]
+            inside = ", ".join(each.removeprefix(f"{table}.") for each in parts)
+            here = f"of controllers.{table}, {words.format(driving)} {inside}"
         given = ", ".join(f"controllers.{name}" for name in sorted(names))
         raise ParameterError(
             f"has no effect: {here}; {given} is read by {', '.join(readers)}",
