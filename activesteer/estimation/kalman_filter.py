@@ -63,7 +63,6 @@ from activesteer.estimation.records import (
     REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
-    UNEXPLAINED,
     YAW_RATE,
 )
 from activesteer.estimation.two_track_model import (
@@ -132,9 +131,12 @@ def _step_of(state, place):
 
 
 @inlined
-def _is_braked(known, memory):
+def _look_at_forces(known, memory):
+    """Find out whether lateral forces show road and tyres, and whether these count as uncertain."""
     plausible = memory.state[FRICTION] + math.sqrt(memory.covariance[FRICTION, FRICTION])
-    return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
+    memory.braked = abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
+    # Else a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
+    memory.taken_as_known = memory.braked and memory.mean_innovation > EXPLAINED
 
 
 @inlined
@@ -154,7 +156,7 @@ def _differentiate(known, tyres, memory, duration_s, moved, slope):
     for column in range(N_STATES):
         slope[:, column] = 0.0
         slope[column, column] = 1.0
-        if column in (RATE_OFFSET, AY_OFFSET):
+        if column in (RATE_OFFSET, AY_OFFSET) or (memory.taken_as_known and column >= FRICTION):
             continue
         step = _step_of(state, column)
         start[column] += step
@@ -218,6 +220,8 @@ def predict(known, tyres, memory, duration_s):
     """Advance the state and its covariance by an interval."""
     n, covariance = N_STATES, memory.covariance
     moved, slope, half, added = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
+    was_braked = memory.braked
+    _look_at_forces(known, memory)
     _differentiate(known, tyres, memory, duration_s, moved, slope)
     _forget(known, memory, duration_s, moved, slope, added)
     _add_noise(known, tyres, memory, duration_s, added)
@@ -240,6 +244,12 @@ def predict(known, tyres, memory, duration_s):
             else:
                 total += half[row, column] * slope[column, column]
             covariance[row, column] = covariance[column, row] = total
+    if memory.taken_as_known or (was_braked and not memory.braked):
+        # The friction circle is not exact, so what has happened while braking does not show road and tyres afterwards.
+        for place in range(FRICTION, n):
+            variance = covariance[place, place]
+            covariance[place, :] = covariance[:, place] = 0.0
+            covariance[place, place] = variance
 
 
 @inlined
@@ -297,12 +307,11 @@ def _take_in(state, covariance, row, error, variance, braked):
 def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     """Process a measurement, and return its normalised squared error and that of the yaw rate alone (chi-square)."""
     state, covariance, row = memory.state, memory.covariance, np.zeros(N_STATES)
-    braked = _is_braked(known, memory)
     row[YAW_RATE] = row[RATE_OFFSET] = 1.0
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
     variance = known.rate_variance_rad2ps2 + (known.rate_fraction * yaw_rate_radps) ** 2
     # One value after the other: the first changes the expectation of the second.
-    of_rate = error * error / _take_in(state, covariance, row, error, variance, braked)
+    of_rate = error * error / _take_in(state, covariance, row, error, variance, memory.braked)
     row[YAW_RATE] = row[RATE_OFFSET] = 0.0
     mass = known.mass_kg
     front_N, rear_N = forces_of(known, tyres, memory, state)
@@ -319,11 +328,9 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
         other_front_N, other_rear_N = forces_of(known, tyres, memory, state)
         state[place] = kept
         row[place] = ((other_front_N - front_N) * cos_f + (other_rear_N - rear_N) * cos_r) / (mass * step)
-    if braked:
-        # Without fading, a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
-        plausible = min(max((UNEXPLAINED - memory.mean_innovation) / (UNEXPLAINED - EXPLAINED), 0.0), 1.0)
-        bend_mps2 *= plausible
-        row[FRICTION:] *= plausible
+    if memory.taken_as_known:
+        bend_mps2 = 0.0
+        row[FRICTION:] = 0.0
     row[AY_OFFSET] = 1.0
     expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass + bend_mps2 / 6.0
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
@@ -332,7 +339,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
     variance += bend_mps2 * bend_mps2 / 18.0
-    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance, braked)
+    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance, memory.braked)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)
