@@ -26,6 +26,9 @@ the same. Therefore a value with an unexpectedly large error changes neither sti
 speed and gravity across the road as an error of two standard deviations would (Huber), and `reopen` makes the friction
 unknown again (see `advance`).
 
+While brakes or motors use much of the friction, the filter does not change the properties of road and tyres. Their
+uncertainty still counts: it makes the lateral speed uncertain, which the lateral acceleration then corrects (Schmidt).
+
 Sources:
     Norgaard, Poulsen, Ravn, New developments in state estimation for nonlinear systems, Automatica 36 (2000), the
     divided-difference filter of second order with h^2 = 3.
@@ -60,7 +63,6 @@ from activesteer.estimation.records import (
     REAR_RATIO,
     REAR_SLIP,
     REAR_STIFFNESS,
-    UNEXPLAINED,
     YAW_RATE,
 )
 from activesteer.estimation.two_track_model import (
@@ -129,9 +131,12 @@ def _step_of(state, place):
 
 
 @inlined
-def _is_braked(known, memory):
+def _look_at_forces(known, memory):
+    """Find out whether lateral forces show road and tyres, and whether these count as uncertain."""
     plausible = memory.state[FRICTION] + math.sqrt(memory.covariance[FRICTION, FRICTION])
-    return abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
+    memory.braked = abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
+    # Else a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
+    memory.taken_as_known = memory.braked and memory.mean_innovation > EXPLAINED
 
 
 @inlined
@@ -146,12 +151,12 @@ def _force_errors(known, front_N, rear_N):
 def _differentiate(known, tyres, memory, duration_s, moved, slope):
     """Compute the state after an interval, and its derivatives with respect to the current state."""
     state = memory.state
-    start, other, braked = state.copy(), np.empty(N_STATES), _is_braked(known, memory)
+    start, other = state.copy(), np.empty(N_STATES)
     follow(known, tyres, memory, start, duration_s, moved)
     for column in range(N_STATES):
         slope[:, column] = 0.0
         slope[column, column] = 1.0
-        if column in (RATE_OFFSET, AY_OFFSET) or (braked and column >= FRICTION):
+        if column in (RATE_OFFSET, AY_OFFSET) or (memory.taken_as_known and column >= FRICTION):
             continue
         step = _step_of(state, column)
         start[column] += step
@@ -215,6 +220,8 @@ def predict(known, tyres, memory, duration_s):
     """Advance the state and its covariance by an interval."""
     n, covariance = N_STATES, memory.covariance
     moved, slope, half, added = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
+    was_braked = memory.braked
+    _look_at_forces(known, memory)
     _differentiate(known, tyres, memory, duration_s, moved, slope)
     _forget(known, memory, duration_s, moved, slope, added)
     _add_noise(known, tyres, memory, duration_s, added)
@@ -237,8 +244,8 @@ def predict(known, tyres, memory, duration_s):
             else:
                 total += half[row, column] * slope[column, column]
             covariance[row, column] = covariance[column, row] = total
-    if _is_braked(known, memory):
-        # Road and tyres are not estimated while braking, so they must not follow the other states by old correlations.
+    if memory.taken_as_known or (was_braked and not memory.braked):
+        # The friction circle is not exact, so what has happened while braking does not show road and tyres afterwards.
         for place in range(FRICTION, n):
             variance = covariance[place, place]
             covariance[place, :] = covariance[:, place] = 0.0
@@ -266,7 +273,7 @@ def _over_friction(known, tyres, memory, here_mps2):
 
 
 @inlined
-def _take_in(state, covariance, row, error, variance):
+def _take_in(state, covariance, row, error, variance, braked):
     """Process one measured value, and return the expected variance of its error."""
     n = len(state)
     spread, expected = np.zeros(n), variance
@@ -281,6 +288,8 @@ def _take_in(state, covariance, row, error, variance):
     if surprise > 1.0:
         used[AY_OFFSET] = used[FRONT_STIFFNESS] = used[REAR_STIFFNESS] = 0.0
         used[LATERAL_SPEED] = used[BANK] = 1.0 / math.sqrt(surprise)
+    if braked:  # forces then show neither friction nor stiffness
+        used[FRICTION:] = 0.0
     if abs(state[FRONT_SLIP]) < _LEAST_SLIP_RAD:
         used[FRONT_STIFFNESS] = 0.0
     if abs(state[REAR_SLIP]) < _LEAST_SLIP_RAD:
@@ -302,7 +311,7 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     error = yaw_rate_radps - state[YAW_RATE] - state[RATE_OFFSET]
     variance = known.rate_variance_rad2ps2 + (known.rate_fraction * yaw_rate_radps) ** 2
     # One value after the other: the first changes the expectation of the second.
-    of_rate = error * error / _take_in(state, covariance, row, error, variance)
+    of_rate = error * error / _take_in(state, covariance, row, error, variance, memory.braked)
     row[YAW_RATE] = row[RATE_OFFSET] = 0.0
     mass = known.mass_kg
     front_N, rear_N = forces_of(known, tyres, memory, state)
@@ -313,21 +322,15 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     )
     here_mps2 = (front_N * cos_f + rear_N * cos_r) / mass
     row[FRICTION], bend_mps2 = _over_friction(known, tyres, memory, here_mps2)
-    braked, unsure_mps2 = _is_braked(known, memory), 0.0
-    if braked:
-        # Without fading, a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
-        plausible = min(max((UNEXPLAINED - memory.mean_innovation) / (UNEXPLAINED - EXPLAINED), 0.0), 1.0)
-        unsure_mps2 = plausible * row[FRICTION] * math.sqrt(covariance[FRICTION, FRICTION])
-        bend_mps2 *= plausible
-        row[FRICTION] = 0.0
     for place in (FRONT_SLIP, REAR_SLIP, FRONT_STIFFNESS, REAR_STIFFNESS, REAR_RATIO):
-        if place > FRICTION and braked:
-            continue
         kept, step = state[place], _step_of(state, place)
         state[place] += step
         other_front_N, other_rear_N = forces_of(known, tyres, memory, state)
         state[place] = kept
         row[place] = ((other_front_N - front_N) * cos_f + (other_rear_N - rear_N) * cos_r) / (mass * step)
+    if memory.taken_as_known:
+        bend_mps2 = 0.0
+        row[FRICTION:] = 0.0
     row[AY_OFFSET] = 1.0
     expected = (front_N * cos_f + rear_N * cos_r + memory.front_along_N * sin_f) / mass + bend_mps2 / 6.0
     error = ay_mps2 - expected - GRAVITY_MPS2 * memory.roll_rad - state[AY_OFFSET]
@@ -335,8 +338,8 @@ def correct(known, tyres, memory, yaw_rate_radps, ay_mps2, duration_s):
     # A force error lasts: during this time all samples count as one measurement.
     repeated = 1.0 + 2.0 * known.force_s / duration_s
     variance = known.ay_variance_m2ps4 + (known.ay_fraction * ay_mps2) ** 2 + repeated * (front + rear) / (mass * mass)
-    variance += bend_mps2 * bend_mps2 / 18.0 + unsure_mps2 * unsure_mps2
-    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance)
+    variance += bend_mps2 * bend_mps2 / 18.0
+    of_both = of_rate + error * error / _take_in(state, covariance, row, error, variance, memory.braked)
     state[FRICTION] = min(max(state[FRICTION], LEAST_FRICTION), LARGEST_FRICTION)
     for place in (FRONT_STIFFNESS, REAR_STIFFNESS):
         state[place] = min(max(state[place], LEAST_STIFFNESS), LARGEST_STIFFNESS)

@@ -44,7 +44,7 @@ MEMORY: Final = np.dtype(
         np.record,
         [
             ("estimate", np.float64, (14,)),
-            ("calls", np.intp),
+            *((name, np.intp) for name in ("calls", "braked", "taken_as_known")),
             # of both measurements (innovations over covariances), sum of what is unexplained
             *(
                 (name, np.float64)

@@ -98,9 +98,9 @@ def lasting(known, rng):
         yield error
 
 
-def one_run(record, tyres, rng: np.random.Generator, kind):
+def one_run(record, tyres, rng: np.random.Generator, kind, front_along_N=0.0):
     """Return the final NEES of the motion and the mean NIS, for a car that is the filter's model with errors of a
-    kind."""
+    kind. A longitudinal force of the front axle acts in the second half of the run."""
     # Python reads a namespace twenty times as fast as a record.
     known = SimpleNamespace(**{name: record[name] for name in record.dtype.names})
     true, memory = np.zeros(1, MEMORY)[0], np.zeros(1, MEMORY)[0]
@@ -112,6 +112,9 @@ def one_run(record, tyres, rng: np.random.Generator, kind):
     squared, errors = [], kind(known, rng)
     for step in range(STEPS):
         angle_rad = 0.03 * math.sin(math.pi * step * INTERVAL_S)
+        if 2 * step >= STEPS:
+            for memory_of in (true, memory):
+                memory_of["along_N"][:2], memory_of["front_along_N"] = 0.5 * front_along_N, front_along_N
         true["front_angle_rad"] = memory["front_angle_rad"] = angle_rad
         predict(record, tyres, memory, INTERVAL_S)
         errors_Ns = force_stds_N(known, forces_of(record, tyres, true, state)) * next(errors)
@@ -153,6 +156,17 @@ def test_forces_that_stay_wrong_make_the_motion_as_wrong_and_single_measurements
     assert low < nees < high
     # What is wrong all the time is taken for less again and again: one measurement is nearer than the filter expects.
     assert nis < bounds(2, RUNS * STEPS)[0]
+
+
+@pytest.mark.parametrize("front_along_N", [-3000.0, 3000.0])
+def test_errors_under_large_longitudinal_forces_are_those_of_its_covariance(known_and_tyres, rng, front_along_N):
+    """The filter then does not learn the friction, but knows how much it moves the car."""
+    known, tyres = known_and_tyres
+    exact = known.copy()
+    exact["along_fraction"] = 0.0  # the forces are known
+    nees = [one_run(exact, tyres, rng, white, front_along_N)[0] for _ in range(RUNS)]
+    low, high = bounds(len(MOTION), RUNS, 0.999)
+    assert low < np.mean(nees) < high
 
 
 @pytest.mark.parametrize(("slip", "sign"), [(FRONT_SLIP, 1.0), (REAR_SLIP, -1.0)])
