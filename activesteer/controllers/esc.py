@@ -24,7 +24,6 @@ from __future__ import annotations
 from activesteer.controllers.corrector import MIN_SPEED_MPS
 from activesteer.controllers.parameters import ControllerSetup, EscParameters
 from activesteer.controllers.turn_reference import BorneTurnReference
-from activesteer.core.conventions import GRAVITY_MPS2
 from activesteer.core.signals import ActuatorCommand, DriverCommand, Measurement
 
 
@@ -38,7 +37,7 @@ class Esc:
     def __init__(self, setup: ControllerSetup) -> None:
         """Create the controller of one run."""
         self._parameters, self._estimator = setup.gains.esc, setup.estimator()
-        self._reference = BorneTurnReference(setup.single_track, self._parameters, setup.timestep_s)
+        self._reference = BorneTurnReference(setup.single_track, self._parameters, setup.timestep_s, reserve=False)
         self._yaw_inertia_kgm2, self._levers = setup.single_track.yaw_inertia_kgm2, brake_levers(setup)
 
     def step(self, command: DriverCommand, measurement: Measurement) -> ActuatorCommand:
@@ -46,9 +45,7 @@ class Esc:
         p, now = self._parameters, self._estimator.step(measurement)
         if now.speed_mps < MIN_SPEED_MPS:
             return ActuatorCommand(estimate=now)
-        # The road bears the present acceleration, so it has no reserve. A turn at a_y / v needs no brakes.
-        shown = abs(measurement.ay_mps2) / (p.friction_fraction * GRAVITY_MPS2)
-        friction = max(now.friction + p.friction_deviations * now.friction_std, shown)
+        friction = now.friction + p.friction_deviations * now.friction_std
         desired = self._reference.borne(command.front_steer_demand_rad, now.speed_mps, friction, measurement.ay_mps2)
         if now.speed_mps < p.least_speed_mps:
             return ActuatorCommand(yaw_rate_desired_radps=desired, estimate=now)

@@ -87,9 +87,12 @@ class BorneTurnReference(TurnReference):
         single_track: SingleTrackParameters,
         parameters: YawMomentParameters,
         interval_s: float,
+        *,
+        reserve: bool = True,
     ) -> None:
-        """Compute the constants."""
+        """Compute the constants; with `reserve`, `friction_fraction` limits a turn at the measured acceleration too."""
         super().__init__(single_track, parameters.reference_length_m, parameters.friction_fraction, interval_s)
+        self._shown_mps2 = GRAVITY_MPS2 if reserve else self._most_mps2
         self._fraction = -math.expm1(-interval_s / parameters.acceleration_time_s)
         self._shortfall_mps2 = parameters.acceleration_shortfall_mps2
         self._expected_radps = 0.0
@@ -97,7 +100,7 @@ class BorneTurnReference(TurnReference):
     def borne(self, front_steer_rad: float, speed_mps: float, friction: float, ay_mps2: float) -> float:
         """Return the desired yaw rate for a speed > 0 and a measured lateral acceleration, left positive [rad/s]."""
         # The road bears the present acceleration. Where wheels leave snow, the estimated friction comes later.
-        shown = max(friction, abs(ay_mps2) / GRAVITY_MPS2)
+        shown = max(friction, abs(ay_mps2) / self._shown_mps2)
         desired_radps = desired_turn(self, front_steer_rad, speed_mps, shown)
         self._expected_radps += self._fraction * (desired_radps - self._expected_radps)
         side = math.copysign(1.0, self._expected_radps)
