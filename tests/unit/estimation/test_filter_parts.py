@@ -377,6 +377,22 @@ def test_friction_not_learned_under_large_longitudinal_forces_is_noise_unless_a_
         assert unsure_of_road == pytest.approx(sure_of_road, rel=0.01)
 
 
+def test_what_happens_under_longitudinal_forces_does_not_show_the_friction_afterwards(known, memory, setup):
+    """The lateral speed follows the friction as long as the forces last, and without a sensor that fails."""
+    tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
+    memory["speed_mps"] = 20.0
+    memory["state"][[FRONT_SLIP, REAR_SLIP]] = math.radians(8.0)
+    followed = []
+    for along_N, mean_innovation in ((-4000.0, 1.0), (-4000.0, 1.0), (0.0, 1.0), (-4000.0, 20.0)):
+        memory["along_N"][:2], memory["front_along_N"] = 0.5 * along_N, along_N
+        memory["mean_innovation"] = mean_innovation
+        predict(known, tyres, memory, 0.01)
+        followed.append(memory["covariance"][LATERAL_SPEED, FRICTION])
+    first, second, released, failed = followed
+    assert second > 1.5 * first > 0.0
+    assert released == failed == 0.0
+
+
 def test_gravity_across_an_inclined_road_moves_the_car_and_the_accelerometer_does_not_feel_it(known, memory, setup):
     tyres = np.array([tyre.force_N for tyre in setup.estimation.tyres])
     memory["speed_mps"], memory["state"][BANK] = 20.0, 0.5
