@@ -131,8 +131,8 @@ def _step_of(state, place):
 
 
 @inlined
-def _look_at_forces(known, memory):
-    """Find out whether lateral forces show road and tyres, and whether these count as uncertain."""
+def _set_braking(known, memory):
+    """Set whether longitudinal forces hide road and tyres, and whether the filter takes these as known."""
     plausible = memory.state[FRICTION] + math.sqrt(memory.covariance[FRICTION, FRICTION])
     memory.braked = abs(memory.front_along_N) > 2.0 * _MOST_BRAKED * plausible * known.front_load_N
     # Else a car whose yaw rate has the wrong sign spins: only the lateral acceleration shows its motion.
@@ -221,7 +221,7 @@ def predict(known, tyres, memory, duration_s):
     n, covariance = N_STATES, memory.covariance
     moved, slope, half, added = np.empty(n), np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
     was_braked = memory.braked
-    _look_at_forces(known, memory)
+    _set_braking(known, memory)
     _differentiate(known, tyres, memory, duration_s, moved, slope)
     _forget(known, memory, duration_s, moved, slope, added)
     _add_noise(known, tyres, memory, duration_s, added)

@@ -113,8 +113,8 @@ def one_run(record, tyres, rng: np.random.Generator, kind, front_along_N=0.0):
     for step in range(STEPS):
         angle_rad = 0.03 * math.sin(math.pi * step * INTERVAL_S)
         if 2 * step >= STEPS:
-            for memory_of in (true, memory):
-                memory_of["along_N"][:2], memory_of["front_along_N"] = 0.5 * front_along_N, front_along_N
+            for each in (true, memory):
+                each["along_N"][:2], each["front_along_N"] = 0.5 * front_along_N, front_along_N
         true["front_angle_rad"] = memory["front_angle_rad"] = angle_rad
         predict(record, tyres, memory, INTERVAL_S)
         errors_Ns = force_stds_N(known, forces_of(record, tyres, true, state)) * next(errors)
