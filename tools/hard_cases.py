@@ -86,10 +86,17 @@ COURSES: Final[dict[str, Course]] = {
 
 def sine_with_dwell(
     vehicle: str, controller: str, car: str, amplitude_deg: float, direction: str, seed: int
-) -> dict[str, float]:
-    """Return yaw-rate ratios [-], displacement [m] and peak of the sideslip angle [deg] of a sine with dwell."""
+) -> dict[str, float] | str:
+    """Return yaw-rate ratios [-], displacement [m] and peak of the sideslip angle [deg] of a sine with dwell.
+
+    The values of a run that ends with an error are nan. For a car that cannot carry the actuator, the
+    error is returned.
+    """
     changes = {**CARS[car], **_SINE, "steer.steering_wheel_deg": amplitude_deg, "steer.direction": direction}
-    found = _metrics("sine_with_dwell", controller, vehicle, changes, "typical", seed)
+    try:
+        found = _metrics("sine_with_dwell", controller, vehicle, changes, "typical", seed)
+    except ModelError as error:  # a rear suspension without a toe link for the screw
+        return str(error)
     return {
         "ratio_1000ms": found.get("yaw_rate_after_1000ms_share", math.nan),
         "ratio_1750ms": found.get("yaw_rate_after_1750ms_share", math.nan),
@@ -109,7 +116,7 @@ def passes(row: Mapping[str, float]) -> bool:
 
 
 def course(vehicle: str, controller: str, name: str, seed: int) -> dict[str, float]:
-    """Return the metrics of another case [SI]."""
+    """Return the metrics of another case [SI], nan if the run ends with an error."""
     case = COURSES[name]
     found = _metrics(case.maneuver, controller, case.vehicle or vehicle, case.changes, case.driver, seed)
     return {metric: found.get(metric, math.nan) for metric in case.metrics}
@@ -121,8 +128,8 @@ def _metrics(
     sensors = {"sensors.preset": "production", "sensors.seed": seed}
     try:
         run = simulate(maneuver, controller, vehicle, {**sensors, **changes}, driver=driver)
-    except (SimulationDiverged, ModelError):
-        return {}  # lost, or a rear suspension without a toe link for the screw
+    except SimulationDiverged:
+        return {}
     last = run.time_s > run.time_s[-1] - 1.0
     return {**run.metrics, "ay_steady_mps2": abs(float(run["ay_mps2"][last].mean()))}
 
@@ -159,7 +166,11 @@ def main() -> None:
     print("sine with dwell: peak of the sideslip angle [deg], displacement [m]; * misses a limit of FMVSS 126")
     print(f"{'vehicle':17}{'car':20}{'controller':12}{'missed':>7}  {heads}  deg")
     for vehicle, car, name in groups:
-        rows = [next(found) for _ in amplitudes_deg]
+        results = [next(found) for _ in amplitudes_deg]
+        rows = [row for row in results if not isinstance(row, str)]
+        if not rows:
+            print(f"{vehicle:17}{car:20}{name:12}{'-':>7}  {results[0]}")
+            continue
         cells = " ".join(
             f"{row['sideslip_deg']:7.1f} {row['displacement_m']:5.2f}{' ' if passes(row) else '*'}" for row in rows
         )
