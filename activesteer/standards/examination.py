@@ -94,8 +94,10 @@ def examine(
     standard = standard_of(name)
     driver = standard.driver if driver is None else driver
     given = dict(overrides or {})
-    check_parts(given, resolve("straight_line", vehicle, given, driver, controllers), ("vehicle", "driver"))
+    scenario = resolve("straight_line", vehicle, given, driver, controllers)
+    check_parts(given, scenario, ("vehicle", "driver"))
     check_gains(given, controllers)
+    scenario.car.on()  # else its error would be a missing result of every controller
     found = {}
     with workers_for(jobs, scheduler=scheduler) as workers:
         for controller in controllers:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from activesteer.core.files import json_text
-from activesteer.errors import ManeuverError
+from activesteer.errors import ManeuverError, ModelError
 from activesteer.pages import render_page
 from activesteer.standards import fmvss126
 from activesteer.standards.examination import EXAMINED_BY, examination_page, examine
@@ -122,6 +122,11 @@ def test_a_controller_with_which_the_car_cannot_be_tested_does_not_stop_the_othe
     assert "it spins" in result.findings["ars"].values["error"]
     assert result.findings["afs"].passed is True
     assert ">no result<" in render_page(examination_page(result))
+
+
+def test_a_car_that_cannot_be_built_is_an_error_and_not_a_missing_result():
+    with pytest.raises(ModelError, match="no toe link for a screw"):
+        examine("fmvss126", vehicle="tesla_model_s", overrides={"rear_actuator.preset": "screw_3deg"}, jobs=1)
 
 
 def test_noisy_sensors_are_drawn_anew_for_each_repetition():
