@@ -89,8 +89,7 @@ def sine_with_dwell(
 ) -> dict[str, float] | str:
     """Return yaw-rate ratios [-], displacement [m] and peak of the sideslip angle [deg] of a sine with dwell.
 
-    The values of a run that ends with an error are nan. For a car that cannot carry the actuator, the
-    error is returned.
+    The values of a run that diverges are nan. If the car cannot carry the actuator, the error is returned.
     """
     changes = {**CARS[car], **_SINE, "steer.steering_wheel_deg": amplitude_deg, "steer.direction": direction}
     try:
@@ -116,7 +115,7 @@ def passes(row: Mapping[str, float]) -> bool:
 
 
 def course(vehicle: str, controller: str, name: str, seed: int) -> dict[str, float]:
-    """Return the metrics of another case [SI], nan if the run ends with an error."""
+    """Return the metrics of another case [SI], nan if the run diverges."""
     case = COURSES[name]
     found = _metrics(case.maneuver, controller, case.vehicle or vehicle, case.changes, case.driver, seed)
     return {metric: found.get(metric, math.nan) for metric in case.metrics}
